@@ -1,0 +1,63 @@
+"""What follows from the triangles alone: edges, borders, neighbours, components."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components as _components
+
+__all__ = [
+    "boundary_edges",
+    "boundary_vertices",
+    "connected_components",
+    "directed_edges",
+    "unique_edges",
+    "vertex_adjacency",
+]
+
+
+def directed_edges(triangles: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Return the three directed edges of every triangle, ``(3F, 2)``: all (0,1), then all (1,2), then all (2,0)."""
+    t = np.asarray(triangles, dtype=np.int64)
+    return np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
+
+
+def unique_edges(triangles: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Return each undirected edge once, ``(E, 2)`` with the lower id first, sorted."""
+    return _edges_with_counts(triangles)[0]
+
+
+def boundary_edges(triangles: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Return the undirected edges that belong to exactly one triangle, ``(B, 2)``."""
+    edges, counts = _edges_with_counts(triangles)
+    return edges[counts == 1]
+
+
+def boundary_vertices(triangles: NDArray[np.integer], n_vertices: int) -> NDArray[np.bool_]:
+    """Mask ``(V,)`` of the vertices on an open border."""
+    mask = np.zeros(n_vertices, dtype=bool)
+    mask[boundary_edges(triangles).ravel()] = True
+    return mask
+
+
+def vertex_adjacency(triangles: NDArray[np.integer], n_vertices: int) -> sp.csr_matrix:
+    """Symmetric 0/1 matrix ``(V, V)``: entry (i, j) is 1 where an edge joins vertices i and j."""
+    edges = unique_edges(triangles)
+    i, j = edges[:, 0], edges[:, 1]
+    ones = np.ones(2 * len(edges))
+    rows, cols = np.concatenate([i, j]), np.concatenate([j, i])
+    return sp.csr_matrix((ones, (rows, cols)), shape=(n_vertices, n_vertices))
+
+
+def connected_components(triangles: NDArray[np.integer], n_vertices: int) -> tuple[int, NDArray[np.int32]]:
+    """Return the number of components and the label ``(V,)`` of each vertex; a lone vertex is its own component."""
+    count, labels = _components(vertex_adjacency(triangles, n_vertices), directed=False)
+    return int(count), labels
+
+
+def _edges_with_counts(triangles: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    directed = np.sort(directed_edges(triangles), axis=1)
+    n = int(directed.max(initial=-1)) + 1
+    keys, counts = np.unique(directed[:, 0] * n + directed[:, 1], return_counts=True)
+    return np.stack([keys // max(n, 1), keys % max(n, 1)], axis=1), counts
