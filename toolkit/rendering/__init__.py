@@ -1,0 +1,21 @@
+"""Pictures of meshes without a display: camera, renderer, colour maps, sheets and videos.
+
+Everything runs on the CPU in this process, so a frame looks the same on a workstation, in a container and in a test.
+"""
+
+from toolkit.rendering.camera import Camera
+from toolkit.rendering.overlay import Lines, Markers
+from toolkit.rendering.renderer import Renderer
+from toolkit.rendering.shading import BONE, CLAY, SKIN, Lighting, Material
+
+__all__ = [
+    "BONE",
+    "CLAY",
+    "SKIN",
+    "Camera",
+    "Lighting",
+    "Lines",
+    "Markers",
+    "Material",
+    "Renderer",
+]
