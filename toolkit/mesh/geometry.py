@@ -20,13 +20,15 @@ def face_normals(vertices: Array, triangles: NDArray[np.integer], *, unit: bool 
 
 def triangle_areas(vertices: Array, triangles: NDArray[np.integer]) -> Array:
     """Areas of the triangles ``(F,)``, in squared mesh units."""
-    return 0.5 * np.linalg.norm(face_normals(vertices, triangles, unit=False), axis=1)
+    normals = face_normals(vertices, triangles, unit=False)
+    return 0.5 * np.sqrt(np.sum(normals**2, axis=1))
 
 
 def vertex_areas(vertices: Array, triangles: NDArray[np.integer]) -> Array:
     """Barycentric area of every vertex ``(V,)``: a third of its triangles' areas."""
     third = np.repeat(triangle_areas(vertices, triangles) / 3, 3)
-    return np.bincount(np.asarray(triangles).ravel(), weights=third, minlength=len(vertices))
+    areas = np.bincount(np.asarray(triangles).ravel(), weights=third, minlength=len(vertices))
+    return areas.astype(np.float64)
 
 
 def vertex_normals(vertices: Array, triangles: NDArray[np.integer]) -> Array:

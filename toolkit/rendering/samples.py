@@ -14,6 +14,7 @@ __all__ = ["Lights", "Surface", "shade"]
 
 Array = NDArray[Any]
 Weights = tuple[float, float, float]
+Corners = tuple[int, int, int]
 
 
 class Surface(NamedTuple):
@@ -67,7 +68,7 @@ def shade(face: Array, surface: Surface, lights: Lights, background: Array, wire
                 for k in range(3):
                     color[k] = background[0, k] * (1 - fade) + background[1, k] * fade
             else:
-                corners = surface.triangles[f]
+                corners = (surface.triangles[f, 0], surface.triangles[f, 1], surface.triangles[f, 2])
                 weights, front = _barycentric(x + 0.5, y + 0.5, corners, surface.screen)
                 for k in range(3):
                     color[k] = _mix(surface.albedo, corners, weights, k)
@@ -80,27 +81,28 @@ def shade(face: Array, surface: Surface, lights: Lights, background: Array, wire
     return image
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def _mix(values: Array, corners: Array, weights: Weights, k: int) -> float:
+@njit(inline="always")
+def _mix(values: Array, corners: Corners, weights: Weights, k: int) -> float:
     return (
         weights[0] * values[corners[0], k] + weights[1] * values[corners[1], k] + weights[2] * values[corners[2], k]
     )
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def _barycentric(x: float, y: float, corners: Array, screen: Array) -> tuple[Weights, bool]:
+@njit(inline="always")
+def _barycentric(x: float, y: float, corners: Corners, screen: Array) -> tuple[Weights, bool]:
     """Weights of the corners at a sample, right in perspective, and whether the triangle faces us."""
-    a, b, c = screen[corners[0]], screen[corners[1]], screen[corners[2]]
-    u = ((c[0] - b[0]) * (y - b[1]) - (c[1] - b[1]) * (x - b[0])) * a[2]
-    v = ((a[0] - c[0]) * (y - c[1]) - (a[1] - c[1]) * (x - c[0])) * b[2]
-    w = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) * c[2]
+    a, b, c = corners
+    ax, ay, bx, by, cx, cy = screen[a, 0], screen[a, 1], screen[b, 0], screen[b, 1], screen[c, 0], screen[c, 1]
+    u = ((cx - bx) * (y - by) - (cy - by) * (x - bx)) * screen[a, 2]
+    v = ((ax - cx) * (y - cy) - (ay - cy) * (x - cx)) * screen[b, 2]
+    w = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) * screen[c, 2]
     total = u + v + w
     # y runs downwards, so a counter-clockwise triangle that faces us has a negative area.
     return (u / total, v / total, w / total), total < 0.0
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def _light(color: Array, corners: Array, weights: Weights, front: bool, surface: Surface, lights: Lights) -> None:
+@njit(inline="always")
+def _light(color: Array, corners: Corners, weights: Weights, front: bool, surface: Surface, lights: Lights) -> None:
     """Turn the albedo in ``color`` (3,) into reflected light, in place: wrapped diffuse, highlights and sky."""
     nx, ny, nz = _direction(surface.normals, corners, weights)
     if not front:
@@ -113,7 +115,7 @@ def _light(color: Array, corners: Array, weights: Weights, front: bool, surface:
     highlight = 0.0
     faintest = 0.003 ** (1.0 / surface.gloss[1])  # below it a highlight is not worth a power
     for j in range(3):
-        lx, ly, lz = lights.directions[j]
+        lx, ly, lz = lights.directions[j, 0], lights.directions[j, 1], lights.directions[j, 2]
         cosine = nx * lx + ny * ly + nz * lz
         strength = lights.strengths[j] * inside
         if j == 0 and cosine > -0.3:
@@ -134,8 +136,8 @@ def _light(color: Array, corners: Array, weights: Weights, front: bool, surface:
     color[2] = _shoulder(color[2] * blue + shine)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def _direction(normals: Array, corners: Array, weights: Weights) -> Weights:
+@njit(inline="always")
+def _direction(normals: Array, corners: Corners, weights: Weights) -> Weights:
     x, y, z = (
         _mix(normals, corners, weights, 0),
         _mix(normals, corners, weights, 1),
@@ -145,8 +147,8 @@ def _direction(normals: Array, corners: Array, weights: Weights) -> Weights:
     return x * scale, y * scale, z * scale
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def _to_eye(points: Array, corners: Array, weights: Weights, eye: Array) -> Weights:
+@njit(inline="always")
+def _to_eye(points: Array, corners: Corners, weights: Weights, eye: Array) -> Weights:
     x = eye[0] - _mix(points, corners, weights, 0)
     y = eye[1] - _mix(points, corners, weights, 1)
     z = eye[2] - _mix(points, corners, weights, 2)
@@ -154,8 +156,8 @@ def _to_eye(points: Array, corners: Array, weights: Weights, eye: Array) -> Weig
     return x * scale, y * scale, z * scale
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def _shadow(corners: Array, weights: Weights, cosine: float, lights: Lights) -> float:
+@njit(inline="always")
+def _shadow(corners: Corners, weights: Weights, cosine: float, lights: Lights) -> float:
     """Share of the key light that arrives; the bias grows where the light grazes."""
     if lights.depth_map.shape[0] < 2:
         return 1.0
@@ -165,24 +167,24 @@ def _shadow(corners: Array, weights: Weights, cosine: float, lights: Lights) -> 
     return float(_lit(lights.depth_map, x, y, near, 3))
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(inline="always")
 def _wrapped(cosine: float, wrap: float) -> float:
     return max((cosine + wrap) / (1.0 + wrap), 0.0)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(inline="always")
 def _shoulder(value: float) -> float:
     """Bend what is brighter than 0.8 smoothly towards 1, so that highlights do not clip."""
     return value if value < 0.8 else 0.8 + 0.2 * (1.0 - np.exp(-(value - 0.8) / 0.2))
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def _draw_wire(color: Array, x: float, y: float, corners: Array, screen: Array, wire: Array) -> None:
+@njit(inline="always")
+def _draw_wire(color: Array, x: float, y: float, corners: Corners, screen: Array, wire: Array) -> None:
     near = np.inf
     for k in range(3):
-        a, b = screen[corners[k]], screen[corners[(k + 1) % 3]]
-        dx, dy = b[0] - a[0], b[1] - a[1]
-        away = abs(dx * (y - a[1]) - dy * (x - a[0])) / max(np.sqrt(dx * dx + dy * dy), 1e-12)
+        a, b = corners[k], corners[(k + 1) % 3]
+        dx, dy = screen[b, 0] - screen[a, 0], screen[b, 1] - screen[a, 1]
+        away = abs(dx * (y - screen[a, 1]) - dy * (x - screen[a, 0])) / max(np.sqrt(dx * dx + dy * dy), 1e-12)
         near = min(near, away)
     cover = min(max(wire[0] + 0.5 - near, 0.0), 1.0)
     for k in range(3):

@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from toolkit.errors import InputError
+from toolkit.mesh import TriangleMesh
+from toolkit.operators import smoothing_average
+from toolkit.smoothing import (
+    SmoothingFilter,
+    SmoothingParameters,
+    apply_steps,
+    parameters_for_wavelength,
+    smooth_with_pymeshlab,
+)
+
+
+@pytest.mark.parametrize("steps", [0, 1, 7, 40, 120])
+def test_the_polynomial_is_the_filter(bump: TriangleMesh, steps: int) -> None:
+    parameters = SmoothingParameters(steps=steps)
+    quick = SmoothingFilter(bump.triangles, bump.n_vertices, parameters).smooth(bump.vertices)
+    average = smoothing_average(bump.triangles, bump.n_vertices)
+    slow = apply_steps(average, bump.vertices, steps, 0.5, -0.53)
+    assert np.abs(quick - slow).max() < 1e-9 * bump.diagonal
+
+
+def test_it_takes_a_third_of_the_passes() -> None:
+    parameters = SmoothingParameters()
+    triangles = np.array([[0, 1, 2]])
+    assert len(SmoothingFilter(triangles, 3, parameters).coefficients) < 40
+
+
+def test_equals_pymeshlab_on_every_vertex(bump: TriangleMesh) -> None:
+    parameters = SmoothingParameters()
+    ours = SmoothingFilter(bump.triangles, bump.n_vertices, parameters).smooth(bump.vertices)
+    theirs = smooth_with_pymeshlab(bump, parameters)
+    assert np.abs(ours - theirs).max() < 1e-6 * bump.diagonal
+    assert np.abs(ours - bump.vertices).max() > 1e-3
+
+
+def test_blocks_in_single_precision(bump: TriangleMesh, take: np.ndarray) -> None:
+    smoother = SmoothingFilter(bump.triangles, bump.n_vertices, SmoothingParameters())
+    deltas = np.moveaxis(take - bump.vertices, 0, 2)[smoother.order]
+    block = smoother.smooth_block(np.ascontiguousarray(deltas, dtype=np.float32))
+    exact = smoother.smooth_block(np.ascontiguousarray(deltas))
+    assert np.abs(block - exact).max() < 1e-6 * np.abs(deltas).max()
+
+
+@pytest.mark.parametrize("wavelength", [0.6, 1.2, 2.4])
+def test_wavelength_halves_a_wave(wavelength: float) -> None:
+    n = 160
+    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    edge = 0.1
+    xy = np.stack([edge * (i + 0.5 * j).ravel(), edge * np.sqrt(3) / 2 * j.ravel()], axis=1)
+    a = (i[:-1, :-1] * n + j[:-1, :-1]).ravel()
+    triangles = np.concatenate([np.stack([a, a + n, a + 1], 1), np.stack([a + n, a + n + 1, a + 1], 1)])
+    parameters = parameters_for_wavelength(wavelength, edge)
+    wave = np.cos(2 * np.pi * xy[:, 0] / wavelength)[:, None]
+    smooth = SmoothingFilter(triangles, n * n, parameters).smooth(wave)
+    inner = (xy[:, 0] > 8) & (xy[:, 0] < 8 + 2.4) & (xy[:, 1] > 5) & (xy[:, 1] < 8)
+    ratio = (smooth[inner] * wave[inner]).sum() / (wave[inner] ** 2).sum()
+    assert ratio == pytest.approx(0.5, abs=0.03)
+
+
+def test_bad_parameters_are_named() -> None:
+    with pytest.raises(InputError, match=r"mu = 0\.2"):
+        SmoothingParameters(mu=0.2)
+    with pytest.raises(InputError, match="two edges"):
+        parameters_for_wavelength(0.1, 0.2)
+
+
+def test_the_paper_s_strength_is_a_wavelength() -> None:
+    """Forty steps of (0.5, -0.53) halve the eigenvalue 0.317, a wave of 5.42 edges."""
+    parameters = parameters_for_wavelength(5.42, 1.0)
+    assert parameters.steps == pytest.approx(40, abs=1)
+    assert parameters.mu == pytest.approx(-0.53, abs=0.001)
