@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from toolkit.errors import InputError
 from toolkit.mesh import TriangleMesh
@@ -70,7 +71,9 @@ def test_bad_parameters_are_named() -> None:
 
 
 def test_the_paper_s_strength_is_a_wavelength() -> None:
-    """Forty steps of (0.5, -0.53) halve the eigenvalue 0.317, a wave of 5.42 edges."""
-    parameters = parameters_for_wavelength(5.42, 1.0)
+    """Forty steps of (0.5, -0.53) halve the wave whose eigenvalue solves ((1 - k/2)(1 + 0.53 k))^40 = 1/2."""
+    eigenvalue = brentq(lambda k: ((1 - 0.5 * k) * (1 + 0.53 * k)) ** 40 - 0.5, 0.15, 0.9)
+    turn = brentq(lambda a: 1 - (np.cos(a) + 2 * np.cos(a / 2)) / 3 - eigenvalue, 0.1, 2)
+    parameters = parameters_for_wavelength(2 * np.pi / turn, 1.0)
     assert parameters.steps == pytest.approx(40, abs=1)
     assert parameters.mu == pytest.approx(-0.53, abs=0.001)

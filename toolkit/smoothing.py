@@ -67,9 +67,9 @@ def parameters_for_wavelength(wavelength: float, edge: float, lambda_: float = 0
     """The filter after which a wave of this length, on a regular mesh with this edge length, has half its height.
 
     On a regular triangle mesh ``I - W`` has the eigenvalue ``k = 1 - (cos a + 2 cos(a / 2)) / 3`` for a wave along
-    an edge, ``a = 2 pi edge / wavelength``, and one step multiplies by ``(1 - lambda k)(1 - mu k)``. The pass band ends at ``1/lambda + 1/mu``; it moves with the
-    wavelength, in the proportion that the paper's 40 steps of (0.5, -0.53) have: with a fixed mu no number of steps
-    would remove a wave longer than nine edges.
+    an edge, ``a = 2 pi edge / wavelength``, and one step multiplies by ``(1 - lambda k)(1 - mu k)``. The pass band
+    ends at ``1/lambda + 1/mu``; it moves with the wavelength, in the proportion that the paper's 40 steps of
+    (0.5, -0.53) have: with a fixed mu no number of steps would remove a wave longer than nine edges.
     """
     if wavelength <= 2 * edge:
         raise InputError(
