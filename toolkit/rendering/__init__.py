@@ -4,18 +4,27 @@ Everything runs on the CPU in this process, so a frame looks the same on a works
 """
 
 from toolkit.rendering.camera import Camera
+from toolkit.rendering.colormap import ColorScale, add_legend
 from toolkit.rendering.overlay import Lines, Markers
 from toolkit.rendering.renderer import Renderer
 from toolkit.rendering.shading import BONE, CLAY, SKIN, Lighting, Material
+from toolkit.rendering.sheet import Row, contact_sheet, side_by_side
+from toolkit.rendering.video import write_video
 
 __all__ = [
     "BONE",
     "CLAY",
     "SKIN",
     "Camera",
+    "ColorScale",
     "Lighting",
     "Lines",
     "Markers",
     "Material",
     "Renderer",
+    "Row",
+    "add_legend",
+    "contact_sheet",
+    "side_by_side",
+    "write_video",
 ]
