@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from toolkit.decomposition import Decomposer, coating, decompose_sequence, frame_neighbours, reconstruct_from_coating
+from toolkit.mesh import TriangleMesh, connected_components, local_frames
+from toolkit.meshio.sequence import FrameSequence
+from toolkit.operators import smoothing_average
+from toolkit.smoothing import apply_steps
+from toolkit.stabilisation import HeadMotion
+
+
+def as_sequence(frames: np.ndarray) -> FrameSequence:
+    return FrameSequence(len(frames), frames.shape[1], 30.0, "memory", lambda a, b: frames[a:b])
+
+
+def shaken(frames: np.ndarray, seed: int = 5) -> tuple[np.ndarray, HeadMotion]:
+    rng = np.random.default_rng(seed)
+    rotations = Rotation.from_rotvec(0.2 * rng.normal(size=(len(frames), 3))).as_matrix()
+    translations = rng.normal(size=(len(frames), 3))
+    moved = np.einsum("tij,tvj->tvi", rotations, frames) + translations[:, None]
+    return moved, HeadMotion(rotations, translations)
+
+
+def decomposed(mesh: TriangleMesh, frames: np.ndarray, motion: HeadMotion | None = None) -> tuple:
+    decomposer = Decomposer(mesh)
+    smooth = np.full(frames.shape, np.nan, dtype=np.float32)
+    details = np.full(frames.shape, np.nan, dtype=np.float32)
+    motion = motion or HeadMotion.none(len(frames))
+    decompose_sequence(as_sequence(frames), decomposer, motion, smooth, details)
+    return decomposer, smooth, details
+
+
+def test_blocks_equal_the_definition(bump: TriangleMesh, take: np.ndarray) -> None:
+    decomposer, smooth, details = decomposed(bump, take)
+    average = smoothing_average(bump.triangles, bump.n_vertices)
+    rest = apply_steps(average, bump.vertices, 40, 0.5, -0.53)
+    for t in (0, 7, 15, 16, 39):
+        smoothed = apply_steps(average, take[t], 40, 0.5, -0.53)
+        frames = local_frames(smoothed, bump.triangles, decomposer.rest.neighbour)
+        e_t = np.einsum("vji,vj->vi", frames, take[t] - smoothed)
+        assert np.abs(smooth[t] - (smoothed - rest)).max() < 1e-6
+        assert np.abs(details[t] - (e_t - decomposer.rest.detail)).max() < 1e-6
+
+
+def test_frames_come_back(bump: TriangleMesh, take: np.ndarray) -> None:
+    decomposer, smooth, details = decomposed(bump, take)
+    rest = decomposer.rest
+    for t in range(len(take)):
+        large = rest.smooth + smooth[t]
+        frames = local_frames(large, bump.triangles, rest.neighbour)
+        again = large + np.einsum("vij,vj->vi", frames, rest.detail + details[t])
+        assert np.abs(again - take[t]).max() < 1e-6 * bump.diagonal
+
+
+def test_details_do_not_see_the_head_move(bump: TriangleMesh, take: np.ndarray) -> None:
+    moved, motion = shaken(take)
+    still = decomposed(bump, take)
+    seen = decomposed(bump, moved, motion)
+    for a, b in zip(still[1:], seen[1:], strict=True):
+        assert np.abs(a - b).max() < 2e-6
+
+
+def test_a_bent_surface_keeps_its_details(bump: TriangleMesh) -> None:
+    """Turning the whole face changes no detail, although it changes every coating."""
+    turn = Rotation.from_rotvec([0.4, -0.3, 0.2]).as_matrix()
+    _, _, details = decomposed(bump, (bump.vertices @ turn.T)[None])
+    assert np.abs(details).max() < 1e-6
+
+
+def test_coating_round_trip_is_exact(bump: TriangleMesh) -> None:
+    second = bump.vertices + [5.0, 0.0, 1.0]
+    vertices = np.concatenate([bump.vertices, second])
+    triangles = np.concatenate([bump.triangles, bump.triangles + bump.n_vertices])
+    mesh = TriangleMesh(vertices, triangles)
+    smooth = Decomposer(mesh).rest.smooth
+    xi = coating(vertices, smooth, triangles)
+    count, labels = connected_components(triangles, len(vertices))
+    gauge = np.stack([(vertices - smooth)[labels == c].mean(axis=0) for c in range(count)])
+    again = reconstruct_from_coating(smooth, xi, triangles, gauge)
+    assert count == 2
+    assert np.abs(again - vertices).max() < 1e-9 * mesh.diagonal
+
+
+def test_neighbours_are_neighbours(bump: TriangleMesh) -> None:
+    neighbour = frame_neighbours(bump.vertices, bump.triangles)
+    edges = {tuple(e) for t in bump.triangles for e in (t[[0, 1]], t[[1, 2]], t[[2, 0]])}
+    assert all((v, w) in edges or (w, v) in edges for v, w in enumerate(neighbour))
+    lonely = np.vstack([bump.vertices, [[9.0, 9, 9]]])
+    assert frame_neighbours(lonely, bump.triangles)[-1] == bump.n_vertices
+
+
+def test_an_error_in_a_block_is_raised(bump: TriangleMesh, take: np.ndarray) -> None:
+    def broken(start: int, stop: int) -> np.ndarray:
+        raise OSError("disk gone")
+
+    sequence = FrameSequence(40, bump.n_vertices, 30.0, "memory", broken)
+    out = np.empty(take.shape, dtype=np.float32)
+    with pytest.raises(OSError, match="disk gone"):
+        decompose_sequence(sequence, Decomposer(bump), HeadMotion.none(40), out, out)

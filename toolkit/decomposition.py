@@ -1,0 +1,184 @@
+"""Splitting frames into large-scale shape and fine detail (the paper's section 3; method, section 3).
+
+``S_t = S~_t + F_t (e_0 + d_t)``: ``S~_t`` the frame smoothed by Taubin's filter, ``F_t`` the local frames of ``S~_t``,
+``e_0`` the reference's own detail and ``d_t`` the motion detail, in place of the paper's Eq. 3. Details are
+displacements in local frames: rotated Laplacian coatings are no longer the Laplacian of anything, and solving for them
+blows that up. The coating ``xi = L (S - S~)`` remains the measure for colour maps and thresholds, and
+`reconstruct_from_coating` is Eq. 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from toolkit.blocks import block_size, map_blocks
+from toolkit.kernels import block_to_frames, frames_to_block, take_details
+from toolkit.mesh.core import TriangleMesh
+from toolkit.mesh.geometry import local_frames, vertex_normals
+from toolkit.mesh.topology import connected_components, unique_edges, vertex_adjacency
+from toolkit.meshio.sequence import FrameSequence
+from toolkit.operators import uniform_laplacian
+from toolkit.progress import Progress, silent
+from toolkit.smoothing import SmoothingFilter, SmoothingParameters
+from toolkit.solve import factorise
+from toolkit.stabilisation import HeadMotion
+
+__all__ = [
+    "Decomposer",
+    "RestShape",
+    "coating",
+    "decompose_sequence",
+    "frame_neighbours",
+    "reconstruct_from_coating",
+]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RestShape:
+    """A reference face, decomposed.
+
+    ``smooth`` (V, 3) the large-scale shape, ``detail`` (V, 3) the fine detail ``e_0`` in the local frames of ``smooth``
+    whose tangents point to ``neighbour`` (V,).
+    """
+
+    smooth: Array
+    detail: Array
+    neighbour: NDArray[np.int64]
+
+
+class Decomposer:
+    """Smoothing and local frames on one connectivity, ready for any number of frames.
+
+    ``rest`` is the decomposed reference, ``filter`` the smoothing operator. Blocks are ``(V, 3, B)`` float32 in the
+    filter's numbering.
+    """
+
+    def __init__(
+        self,
+        mesh: TriangleMesh,
+        parameters: SmoothingParameters | None = None,
+        neighbour: NDArray[np.integer] | None = None,
+    ) -> None:
+        self.mesh = mesh
+        resolved = (parameters or SmoothingParameters()).resolved(mesh)
+        self.filter = SmoothingFilter(mesh.triangles, mesh.n_vertices, resolved)
+        smooth = np.asarray(self.filter.smooth(mesh.vertices), dtype=np.float64)
+        if neighbour is None:
+            neighbour = frame_neighbours(smooth, mesh.triangles)
+        frames = local_frames(smooth, mesh.triangles, neighbour)
+        detail = np.einsum("vji,vj->vi", frames, mesh.vertices - smooth)
+        self.rest = RestShape(smooth, detail, np.asarray(neighbour, dtype=np.int64))
+        self.block = BlockNumbering(self.filter.order, mesh.triangles, neighbour)
+        order = self.filter.order
+        self._origin = smooth.mean(axis=0)
+        self._rest = np.ascontiguousarray(mesh.vertices[order])
+        self._smooth32 = (smooth - self._origin)[order].astype(np.float32)
+        self._offset32 = (mesh.vertices - smooth)[order].astype(np.float32)
+        self._detail32 = detail[order].astype(np.float32)
+
+    def decompose(
+        self, frames: NDArray[np.float32], motion: HeadMotion, start: int
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Frames ``(B, V, 3)`` from ``start`` on -> smoothed deltas ``S~_t - S~_0`` and motion details, ``(V, 3, B)``.
+
+        Deltas are small, so float32 costs 1e-7 of the motion, not of the position.
+        """
+        stop = start + len(frames)
+        delta = np.empty((self.mesh.n_vertices, 3, len(frames)), dtype=np.float32)
+        frames_to_block(
+            frames,
+            self.filter.order,
+            motion.rotations[start:stop],
+            motion.translations[start:stop],
+            self._rest,
+            delta,
+        )
+        smooth = self.filter.smooth_block(delta)
+        points = smooth + self._smooth32[:, :, None]
+        delta -= smooth
+        delta += self._offset32[:, :, None]  # now S_t - S~_t
+        take_details(points, self.block.triangles, self.block.neighbour, np.empty_like(points), delta, self._detail32)
+        return smooth, delta
+
+
+class BlockNumbering:
+    """Triangles and frame neighbours in the numbering that blocks are kept in."""
+
+    def __init__(
+        self, order: NDArray[np.int64], triangles: NDArray[np.integer], neighbour: NDArray[np.integer]
+    ) -> None:
+        position = np.empty(len(order), dtype=np.int32)
+        position[order] = np.arange(len(order), dtype=np.int32)
+        renumbered = position[triangles]
+        # In the order of their vertices, so that the scattered additions stay in the cache.
+        self.triangles = np.ascontiguousarray(renumbered[np.argsort(renumbered.min(axis=1), kind="stable")])
+        self.neighbour = np.ascontiguousarray(position[np.asarray(neighbour)[order]])
+
+
+def decompose_sequence(
+    sequence: FrameSequence,
+    decomposer: Decomposer,
+    motion: HeadMotion,
+    smooth_deltas: NDArray[np.float32],
+    details: NDArray[np.float32],
+    progress: Progress = silent,
+) -> None:
+    """Decompose a take into ``smooth_deltas`` and ``details``, both ``(T, V, 3)`` float32, possibly memory-mapped."""
+
+    def work(start: int, stop: int) -> None:
+        smooth, detail = decomposer.decompose(sequence.read(start, stop), motion, start)
+        block_to_frames(smooth, decomposer.filter.order, smooth_deltas[start:stop])
+        block_to_frames(detail, decomposer.filter.order, details[start:stop])
+
+    size = block_size(sequence.n_vertices)
+    map_blocks(work, sequence.n_frames, size, what="decomposing frames", progress=progress)
+
+
+def frame_neighbours(vertices: Array, triangles: NDArray[np.integer]) -> NDArray[np.int64]:
+    """For each vertex the neighbour that its local frame's tangent points to, ``(V,)``.
+
+    The one whose edge is longest in the tangent plane, in units of the vertex's longest: the direction then depends
+    least on noise. A vertex without neighbours points to itself.
+    """
+    normals = vertex_normals(vertices, triangles)
+    edges = unique_edges(triangles)
+    start, end = np.concatenate([edges, edges[:, ::-1]]).T
+    vector = vertices[end] - vertices[start]
+    along = np.sum(vector * normals[start], axis=1)
+    length = np.sqrt(np.maximum(np.sum(vector**2, axis=1) - along**2, 0))
+    best_last = np.lexsort((-end, length, start))
+    last = np.flatnonzero(np.append(np.diff(start[best_last]) != 0, True))
+    neighbour = np.arange(len(vertices))
+    neighbour[start[best_last[last]]] = end[best_last[last]]
+    return neighbour
+
+
+def coating(vertices: Array, smooth: Array, triangles: NDArray[np.integer]) -> Array:
+    """Laplacian coating ``xi = L (S - S~)``, ``(V, 3)`` in mesh units (the paper's Eq. 1; Sorkine et al. 2004)."""
+    return np.asarray(uniform_laplacian(triangles, len(vertices)) @ (vertices - smooth))
+
+
+def reconstruct_from_coating(smooth: Array, xi: Array, triangles: NDArray[np.integer], gauge: Array) -> Array:
+    """``S = S~ + L^+ xi`` (the paper's Eq. 2), ``(V, 3)``.
+
+    ``L`` leaves one constant free in each connected component; ``gauge`` (C, 3) is the mean of ``S - S~`` over each
+    component in the order of `connected_components`. Only the small detail is solved for, so the round trip is exact.
+    """
+    n = len(smooth)
+    count, labels = connected_components(triangles, n)
+    adjacency = vertex_adjacency(triangles, n)
+    degree = np.asarray(adjacency.sum(axis=1)).ravel()
+    # D L = D - A is symmetric; a rank-one term on each component's first vertex fixes the constant.
+    first = np.zeros(n)
+    first[np.unique(labels, return_index=True)[1]] = 1
+    factor = factorise(sp.csc_matrix(sp.diags(degree + first) - adjacency))
+    detail = factor.solve(degree[:, None] * xi)
+    size = np.bincount(labels, minlength=count)[:, None]
+    mean = np.stack([np.bincount(labels, weights=detail[:, k], minlength=count) for k in range(3)], axis=1) / size
+    return smooth + detail + (gauge - mean)[labels]
