@@ -1,0 +1,41 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from toolkit.report.numbers import format_value, number_rows
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, "–"),
+        (True, "yes"),
+        (105550, "105\u202f550"),
+        (0.123456, "0.1235"),
+        (np.float32(2.5), "2.5"),
+        ([1, 2.5, "x"], "1, 2.5, x"),
+        (np.arange(20), "0, 1, 2, 3, 4, 5, 6, 7, … (20 in all)"),
+        ("mm", "mm"),
+    ],
+)
+def test_values_are_printed_sensibly(value, text):
+    assert format_value(value) == text
+
+
+def test_shares_are_percents_with_a_verdict():
+    rows = number_rows({"flipped_share": 0.0012, "wrong_sheet": {"lips": 0.004, "wrong_lip": 0.5}})
+    assert [row.value for row in rows] == ["0.12 %", "0.004", "50 %"]
+    assert [row.verdict for row in rows] == ["good", "", "poor"]
+    assert rows[2].name == "Wrong sheet · wrong lip"
+
+
+def test_an_explanation_is_given_once():
+    rows = number_rows({"flips_a": 0.1, "flips_b": 0.2, "unheard_of": 3})
+    assert rows[0].judge
+    assert rows[1].judge == ""
+    assert rows[2].judge == ""
+
+
+def test_what_is_not_finite_has_no_verdict():
+    assert number_rows({"flips": float("nan")})[0].verdict == ""

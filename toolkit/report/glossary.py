@@ -1,0 +1,117 @@
+"""What the numbers mean and how to judge them, for a technical artist who never saw the paper."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+__all__ = ["GLOSSARY", "Entry", "explain"]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """``pattern`` of the number's name, ``judge`` one sentence; up to ``good`` is fine, above ``poor`` look closely.
+
+    ``share`` numbers are fractions of one and are shown in percent; the limits are fractions too.
+    """
+
+    pattern: str
+    judge: str
+    good: float | None = None
+    poor: float | None = None
+    share: bool = False
+
+
+GLOSSARY: tuple[Entry, ...] = (
+    Entry(
+        r"flip",
+        "Triangles turned inside out by the registration. They show as dark specks; none is best.",
+        good=0.002,
+        poor=0.01,
+        share=True,
+    ),
+    Entry(
+        r"wrong_(sheet|lip|lid)",
+        "Vertices that landed on the other lip or lid. They tear when the mouth or the eyes open: add "
+        "landmarks or feature lines there.",
+        good=0.002,
+        poor=0.01,
+        share=True,
+    ),
+    Entry(
+        r"landmark.*(share|relative|percent)",
+        "How far landmarks ended from their partners, as a share of the face's height. One large value is "
+        "usually one misplaced landmark.",
+        good=0.01,
+        poor=0.03,
+        share=True,
+    ),
+    Entry(
+        r"landmark",
+        "How far landmarks ended from their partners. One large value is usually one misplaced landmark.",
+    ),
+    Entry(
+        r"distance.*(share|relative)|(share|relative).*distance",
+        "Distance of the fitted face from the target's surface, as a share of the face's height.",
+        good=0.002,
+        poor=0.01,
+        share=True,
+    ),
+    Entry(
+        r"distance",
+        "Distance of the fitted face from the target's surface. Small everywhere but at parts that the "
+        "target lacks is right; patches of colour on the skin are not.",
+    ),
+    Entry(
+        r"gap",
+        "How far lips or lids stay apart that touch in the source. Above half a percent of the face's "
+        "height the eye sees it: give feature lines on both rims.",
+    ),
+    Entry(
+        r"crossing",
+        "Triangles that run through each other, mostly at lips or lids. Watch these frames in the video.",
+    ),
+    Entry(
+        r"jitter",
+        "Frame-to-frame trembling, measured by second differences. The result's should not exceed the source's.",
+    ),
+    Entry(
+        r"residual|basis_error|rms_error|bases.*error",
+        "What the bases leave out of the source's large motion. If an expression looks weak, ask for more "
+        "bases or a lower threshold.",
+    ),
+    Entry(
+        r"^n_bases|(^|_)k$|n_selected",
+        "How many frames serve as bases. Ten to thirty is usual for a take.",
+    ),
+    Entry(
+        r"wrinkle|detail.*energy",
+        "Strength of the fine detail. The result's curve should rise and fall with the source's.",
+    ),
+    Entry(
+        r"coating",
+        "Size of the fine detail that the smoothing took off: pores, wrinkles and creases.",
+    ),
+    Entry(
+        r"strength|wavelength",
+        "What counts as detail: shorter features travel as wrinkles, longer ones as shape.",
+    ),
+    Entry(
+        r"gain",
+        "Factor on the transferred wrinkles; below one for smooth faces, such as a child's.",
+    ),
+    Entry(
+        r"scale",
+        "Size of the target's face relative to the source's; motion is scaled by it.",
+    ),
+    Entry(
+        r"peak.*gb|memory",
+        "Most memory in use at a time.",
+    ),
+)
+
+
+def explain(name: str) -> Entry | None:
+    """Return the first entry whose pattern occurs in the last part of ``name`` (dotted), or None."""
+    leaf = name.rsplit(".", 1)[-1].lower()
+    return next((entry for entry in GLOSSARY if re.search(entry.pattern, leaf)), None)
