@@ -49,8 +49,9 @@ class BasisParameters:
 class BasisSelection:
     """The chosen bases and their weights.
 
-    ``frames`` (K,) indices of the chosen frames, in the order of choice; ``weights`` (T, K), non-negative; ``errors`` (K + 1,) RMS error over all vertices and frames with 0, 1, ... K bases, in mesh units; ``frame_errors``
-    (T,) RMS error of each frame with all K.
+    ``frames`` (K,) indices of the chosen frames, in the order of choice; ``weights`` (T, K), non-negative; ``errors``
+    (K + 1,) RMS error over all vertices and frames with 0, 1, ... K bases, in mesh units; ``frame_errors`` (T,) RMS
+    error of each frame with all K.
     """
 
     frames: NDArray[np.int64]
