@@ -38,7 +38,10 @@ def check_scale(source: NDArray[np.float64], target: NDArray[np.float64], where:
 
 
 def unit_guess(ratio: float) -> str:
-    """Return " (metres against centimetres?)" for a ratio near 0.01, the unit of the larger number last; else ""."""
+    """Return the likeliest pair of units for a ratio of sizes, e.g. " (metres against centimetres?)" for 0.01.
+
+    The unit of the numerator comes first; empty where no pair of units fits.
+    """
     fits = [
         (abs(np.log(ratio * _UNITS[a] / _UNITS[b])), _COMMON.index(a) + _COMMON.index(b), f" ({a} against {b}?)")
         for a in _COMMON
