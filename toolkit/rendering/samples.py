@@ -83,9 +83,7 @@ def shade(face: Array, surface: Surface, lights: Lights, background: Array, wire
 
 @njit(inline="always")
 def _mix(values: Array, corners: Corners, weights: Weights, k: int) -> float:
-    return (
-        weights[0] * values[corners[0], k] + weights[1] * values[corners[1], k] + weights[2] * values[corners[2], k]
-    )
+    return weights[0] * values[corners[0], k] + weights[1] * values[corners[1], k] + weights[2] * values[corners[2], k]
 
 
 @njit(inline="always")
