@@ -1,0 +1,113 @@
+"""All checks of one transfer's input in their order, with the repairs between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolkit.checks.findings import Finding, log_findings, raise_for
+from toolkit.checks.mesh import check_mesh
+from toolkit.checks.picks import Line, check_feature_lines, check_landmarks
+from toolkit.checks.repair import repair_source, repair_target
+from toolkit.checks.scale import check_scale
+from toolkit.checks.sequence import check_pair, check_sequence
+from toolkit.mesh import TriangleMesh
+from toolkit.meshio.sequence import FrameSequence
+from toolkit.progress import Progress, silent
+
+__all__ = ["CheckedInputs", "Places", "check_inputs"]
+
+Ids = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where each input came from, for the messages: file names."""
+
+    source: str = "source reference"
+    target: str = "target reference"
+    landmarks: str = "landmarks"
+    feature_lines: str = "feature lines"
+
+
+@dataclass(frozen=True)
+class CheckedInputs:
+    """Inputs that work can begin with.
+
+    ``source`` has the vertices that were given, in their order; ``target`` may be another mesh, and
+    ``target_vertex_map`` (V_given,) int64 says where its vertices went (-1: removed). Ids of landmarks and lines on
+    the target go through ``on_target``. ``findings`` and ``notes`` are what was said in the log.
+    """
+
+    source: TriangleMesh
+    target: TriangleMesh
+    target_vertex_map: Ids
+    findings: tuple[Finding, ...]
+    notes: tuple[str, ...] = field(default=())
+
+    def on_target(self, ids: Sequence[int] | NDArray[np.integer]) -> Ids:
+        """Return ids ``(N,)`` of the target as given as ids of the target to work with."""
+        return self.target_vertex_map[np.asarray(ids, dtype=np.int64)]
+
+
+def check_inputs(
+    source: TriangleMesh,
+    sequence: FrameSequence,
+    target: TriangleMesh,
+    *,
+    names: Sequence[str],
+    source_ids: Sequence[int] | NDArray[np.integer],
+    target_ids: Sequence[int] | NDArray[np.integer],
+    source_lines: Sequence[Line] = (),
+    target_lines: Sequence[Line] = (),
+    places: Places | None = None,
+    progress: Progress = silent,
+) -> CheckedInputs:
+    """Check everything, quick checks first, reading the take last; repair the two meshes.
+
+    ``names``, ``source_ids``, ``target_ids`` (N,) are the landmark pairs.
+
+    Raises
+    ------
+    InputError : the first error found, of the first step that finds any
+    """
+    places = places or Places()
+    said: list[Finding] = []
+
+    def judge(findings: list[Finding]) -> None:
+        raise_for(findings)
+        log_findings(finding for finding in findings if finding.repair is None or finding.severity == "info")
+        said.extend(findings)
+
+    judge(check_mesh(source, places.source) + check_mesh(target, places.target))
+    judge(check_pair(source, sequence, places.source))
+    judge(check_landmarks(names, source_ids, target_ids, source, target, places.landmarks))
+    judge(check_feature_lines(source_lines, source, places.feature_lines))
+    judge(check_feature_lines(target_lines, target, places.feature_lines))
+    judge(check_scale(source.vertices[np.asarray(source_ids)], target.vertices[np.asarray(target_ids)], places.target))
+    mended = repair_source(source, places.source), repair_target(target, places.target)
+    judge(_lost_picks(names, target_ids, target_lines, mended[1].vertex_map, places))
+    judge(check_sequence(sequence, source, progress=progress))
+    notes = mended[0].notes + mended[1].notes
+    return CheckedInputs(mended[0].mesh, mended[1].mesh, mended[1].vertex_map, tuple(said), notes)
+
+
+def _lost_picks(
+    names: Sequence[str],
+    target_ids: Sequence[int] | NDArray[np.integer],
+    target_lines: Sequence[Line],
+    vertex_map: Ids,
+    places: Places,
+) -> list[Finding]:
+    """Picks on target vertices that only broken faces used."""
+    picks = [(places.landmarks, f"landmark '{name}'", id_) for name, id_ in zip(names, target_ids, strict=True)]
+    for line in target_lines:
+        picks += [(places.feature_lines, f"feature line '{line.name}'", id_) for id_ in line.vertices]
+    return [
+        Finding("error", f"{what} is on target vertex {id_}, which only broken faces use", where, int(id_), "move it")
+        for where, what, id_ in picks
+        if vertex_map[id_] < 0
+    ]
