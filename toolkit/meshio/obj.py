@@ -165,7 +165,5 @@ def _unreadable(text: bytes, rows: NDArray[np.bool_], path: str | Path) -> Input
     for row, line in zip(np.flatnonzero(rows), text.split(b"\n"), strict=False):
         if parse_floats(line, len(line.split())) is None:
             words = line.decode("ascii", "replace").strip()[:60]
-            return InputError(
-                f"line {row + 1} has a word that is not a number: {words!r}", where=path, remedy=_REMEDY
-            )
+            return InputError(f"line {row + 1} has a word that is not a number: {words!r}", where=path, remedy=_REMEDY)
     return InputError("holds a number that cannot be read", where=path, remedy=_REMEDY)

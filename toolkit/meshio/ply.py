@@ -132,9 +132,7 @@ def _read_elements(path: str | Path, *, last: str) -> dict[str, _Columns]:
         text = data[offset:]
         numbers = parse_floats(text, len(text.split()))
         if numbers is None:
-            raise InputError(
-                "the text after the header holds a word that is not a number", where=path, remedy=_REMEDY
-            )
+            raise InputError("the text after the header holds a word that is not a number", where=path, remedy=_REMEDY)
         source, offset, read_rows = numbers, 0, _text_rows
     columns: dict[str, _Columns] = {}
     for element in elements:

@@ -13,7 +13,7 @@ from toolkit.errors import InputError
 from toolkit.meshio.aside import written_aside
 from toolkit.progress import Progress, silent
 
-__all__ = ["FrameSequence", "cache_as_npy", "checked_fps"]
+__all__ = ["FrameSequence", "cache_as_npy", "checked_fps", "frame_blocks"]
 
 _BLOCK_BYTES = 64 * 2**20
 
@@ -53,11 +53,16 @@ class FrameSequence:
             return np.zeros((0, self.n_vertices, 3), dtype=np.float32)
         return np.array(self.read_block(start, stop), dtype=np.float32, order="C")
 
-    def blocks(self, size: int | None = None) -> Iterator[tuple[int, int]]:
-        """Yield ``(start, stop)`` over all frames, ``size`` at a time (by default about 64 MB)."""
-        step = size or max(1, _BLOCK_BYTES // (self.n_vertices * 12))
-        for start in range(0, self.n_frames, step):
-            yield start, min(start + step, self.n_frames)
+    def blocks(self) -> Iterator[tuple[int, int]]:
+        """Yield ``(start, stop)`` over all frames, in blocks of about 64 MB."""
+        return frame_blocks(self.n_frames, self.n_vertices)
+
+
+def frame_blocks(n_frames: int, n_vertices: int) -> Iterator[tuple[int, int]]:
+    """Yield ``(start, stop)`` over ``n_frames`` frames, in blocks of about 64 MB of float32 positions."""
+    step = max(1, _BLOCK_BYTES // (n_vertices * 12))
+    for start in range(0, n_frames, step):
+        yield start, min(start + step, n_frames)
 
 
 def cache_as_npy(sequence: FrameSequence, path: str | Path, progress: Progress = silent) -> FrameSequence:
