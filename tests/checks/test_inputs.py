@@ -7,6 +7,7 @@ import pytest
 
 from toolkit.checks import check_inputs
 from toolkit.errors import InputError
+from toolkit.feature_lines import FeatureLine
 from toolkit.mesh import TriangleMesh
 from toolkit.meshio.sequence import FrameSequence
 
@@ -39,8 +40,14 @@ def test_landmarks_follow_a_target_that_is_repaired(inputs, caplog):
     target = inputs["target"]
     loose = TriangleMesh(np.concatenate([[[1, 2, 3.0]], target.vertices]), (target.triangles + 1)[:, ::-1])
     given = inputs["target_ids"] + 1
-    checked = check_inputs(**{**inputs, "target": loose, "target_ids": given})
-    np.testing.assert_array_equal(checked.target.vertices[checked.on_target(given)], loose.vertices[given])
+    lines = [
+        FeatureLine("lid", False, np.array([3, 9]), np.array([4, 10])),
+        FeatureLine("lip", False, np.array([1, 2])),
+    ]
+    checked = check_inputs(**{**inputs, "target": loose, "target_ids": given, "lines": lines})
+    np.testing.assert_array_equal(checked.target.vertices[checked.target_ids], loose.vertices[given])
+    assert checked.lines[0].target_vertices.tolist() == [3, 9]
+    assert checked.lines[1] is lines[1]
     assert len(checked.notes) == 2
     assert "removed 1 vertices" in caplog.text
     assert "turned all faces over" in caplog.text
@@ -66,6 +73,8 @@ def test_a_landmark_that_only_a_broken_face_holds_is_refused(inputs):
     [
         (lambda i: {"source": i["source"].with_vertices(i["source"].vertices * np.nan)}, "source reference: vertex 0"),
         (lambda i: {"target": replace(i["target"], triangles=i["target"].triangles + 1)}, "ids run from 0"),
+        (lambda i: {"lines": [FeatureLine("lid", True, np.array([3, 9, 9]))]}, "twice in a row"),
+        (lambda i: {"lines": [FeatureLine("lid", False, np.array([3, 9]), np.array([-3, 9]))]}, "(target): feature"),
         (lambda i: {"target_ids": i["target_ids"] + 100}, "landmarks: landmark"),
         (lambda i: {"sequence": replace(i["sequence"], n_vertices=7)}, "the frames have 7"),
     ],

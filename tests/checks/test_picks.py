@@ -121,8 +121,8 @@ def test_good_lines_pass(head):
         (Line("lip", [4]), "has 1 vertices, an open one needs 2"),
         (Line("lip", []), "has 0 vertices"),
         (Line("lip", [4, 9], closed=True), "a closed one needs 3"),
-        (Line("lip", [4, 9, 20, 9]), "vertex 9 twice"),
-        (Line("lip", [4, 9, 20, 4], closed=True), "vertex 4 twice"),
+        (Line("lip", [4, 9, 9, 20]), "vertex 9 twice in a row, at place 1"),
+        (Line("lip", [4, 9, 20, 4], closed=True), "ends with its first vertex 4"),
     ],
 )
 def test_bad_lines_are_named(head, line, words):
@@ -135,6 +135,11 @@ def test_bad_lines_are_named(head, line, words):
 def test_a_loop_that_repeats_its_first_vertex_is_told_how_to_close(head):
     (finding,) = check_feature_lines([Line("lid", [4, 9, 20, 4])], head)
     assert '"closed": true' in finding.remedy
+
+
+def test_a_line_that_comes_back_on_itself_is_let_pass_with_a_warning(head):
+    (finding,) = check_feature_lines([Line("lid", [4, 9, 20, 9])], head)
+    assert (finding.severity, finding.what) == ("warning", "feature line 'lid' comes to vertex 9 twice")
 
 
 def test_a_line_from_one_part_to_another(head_with_eyes):

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.checks.findings import Finding, log_findings, raise_for
 from toolkit.checks.mesh import check_mesh
-from toolkit.checks.picks import Line, check_feature_lines, check_landmarks
+from toolkit.checks.picks import check_feature_lines, check_landmarks
 from toolkit.checks.repair import repair_source, repair_target
 from toolkit.checks.scale import check_scale
 from toolkit.checks.sequence import check_pair, check_sequence
+from toolkit.feature_lines import FeatureLine
 from toolkit.mesh import TriangleMesh
 from toolkit.meshio.sequence import FrameSequence
 from toolkit.progress import Progress, silent
@@ -37,20 +38,19 @@ class Places:
 class CheckedInputs:
     """Inputs that work can begin with.
 
-    ``source`` has the vertices that were given, in their order; ``target`` may be another mesh, and
-    ``target_vertex_map`` (V_given,) int64 says where its vertices went (-1: removed). Ids of landmarks and lines on
-    the target go through ``on_target``. ``findings`` and ``notes`` are what was said in the log.
+    ``source`` has the vertices that were given, in their order. ``target`` may be another mesh than was given:
+    ``target_vertex_map`` (V_given,) says where its vertices went (-1: removed), and ``target_ids`` (N,), the
+    landmarks, and the ``target_vertices`` of ``lines`` are ids of the new one. ``findings`` and ``notes`` (what was
+    repaired) have been said in the log.
     """
 
     source: TriangleMesh
     target: TriangleMesh
+    target_ids: Ids
+    lines: tuple[FeatureLine, ...]
     target_vertex_map: Ids
     findings: tuple[Finding, ...]
-    notes: tuple[str, ...] = field(default=())
-
-    def on_target(self, ids: Sequence[int] | NDArray[np.integer]) -> Ids:
-        """Return ids ``(N,)`` of the target as given as ids of the target to work with."""
-        return self.target_vertex_map[np.asarray(ids, dtype=np.int64)]
+    notes: tuple[str, ...]
 
 
 def check_inputs(
@@ -61,44 +61,56 @@ def check_inputs(
     names: Sequence[str],
     source_ids: Sequence[int] | NDArray[np.integer],
     target_ids: Sequence[int] | NDArray[np.integer],
-    source_lines: Sequence[Line] = (),
-    target_lines: Sequence[Line] = (),
+    lines: Sequence[FeatureLine] = (),
     places: Places | None = None,
     progress: Progress = silent,
 ) -> CheckedInputs:
     """Check everything, quick checks first, reading the take last; repair the two meshes.
 
-    ``names``, ``source_ids``, ``target_ids`` (N,) are the landmark pairs.
+    ``names``, ``source_ids``, ``target_ids`` (N,) are the landmark pairs, ids from 0.
 
     Raises
     ------
     InputError : the first error found, of the first step that finds any
     """
     places = places or Places()
+    on_target = [replace(line, vertices=line.target_vertices) for line in lines if line.target_vertices is not None]
     said: list[Finding] = []
 
     def judge(findings: list[Finding]) -> None:
         raise_for(findings)
+        # What is repaired is said by the repair.
         log_findings(finding for finding in findings if finding.repair is None or finding.severity == "info")
         said.extend(findings)
 
     judge(check_mesh(source, places.source) + check_mesh(target, places.target))
     judge(check_pair(source, sequence, places.source))
     judge(check_landmarks(names, source_ids, target_ids, source, target, places.landmarks))
-    judge(check_feature_lines(source_lines, source, places.feature_lines))
-    judge(check_feature_lines(target_lines, target, places.feature_lines))
+    judge(check_feature_lines(lines, source, places.feature_lines))
+    judge(check_feature_lines(on_target, target, f"{places.feature_lines} (target)"))
     judge(check_scale(source.vertices[np.asarray(source_ids)], target.vertices[np.asarray(target_ids)], places.target))
-    mended = repair_source(source, places.source), repair_target(target, places.target)
-    judge(_lost_picks(names, target_ids, target_lines, mended[1].vertex_map, places))
+    good_source, good_target = repair_source(source, places.source), repair_target(target, places.target)
+    moved = good_target.vertex_map
+    judge(_lost_picks(names, target_ids, on_target, moved, places))
     judge(check_sequence(sequence, source, progress=progress))
-    notes = mended[0].notes + mended[1].notes
-    return CheckedInputs(mended[0].mesh, mended[1].mesh, mended[1].vertex_map, tuple(said), notes)
+    return CheckedInputs(
+        good_source.mesh,
+        good_target.mesh,
+        moved[np.asarray(target_ids, dtype=np.int64)],
+        tuple(
+            line if line.target_vertices is None else replace(line, target_vertices=moved[line.target_vertices])
+            for line in lines
+        ),
+        moved,
+        tuple(said),
+        good_source.notes + good_target.notes,
+    )
 
 
 def _lost_picks(
     names: Sequence[str],
     target_ids: Sequence[int] | NDArray[np.integer],
-    target_lines: Sequence[Line],
+    target_lines: Sequence[FeatureLine],
     vertex_map: Ids,
     places: Places,
 ) -> list[Finding]:

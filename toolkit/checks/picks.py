@@ -22,6 +22,9 @@ ADVISED_LANDMARKS = 30
 """Below this the registration's error grows quickly (design: 40 to 50 are wanted)."""
 
 
+CLOSED = '"closed": true'
+
+
 class Line(Protocol):
     """A feature line: its name, whether it is a loop, and its vertex ids in order."""
 
@@ -93,16 +96,30 @@ def _check_line(line: Line, index: int, parts: NDArray[np.int32], where: str) ->
     if len(outside):
         what = f"{name} has vertex {ids[outside[0]]} at place {outside[0]}, but ids run from 0 to {len(parts) - 1}"
         return [Finding("error", what, where, index, "pick it again on the reference in use")]
-    values, counts = np.unique(ids, return_counts=True)
-    if (counts > 1).any():
-        again = values[np.argmax(counts > 1)]
-        remedy = 'write the first vertex once and set "closed": true' if again == ids[0] == ids[-1] else "remove one"
-        return [Finding("error", f"{name} has vertex {again} twice", where, index, remedy)]
+    return _check_course(ids, name, line.closed, parts, (where, index))
+
+
+def _check_course(
+    ids: NDArray[np.int64], name: str, closed: bool, parts: NDArray[np.int32], place: tuple[str, int]
+) -> list[Finding]:
+    """A line has to get somewhere at every step, on one part, and better not twice to one vertex."""
+    if ids[0] == ids[-1]:
+        what = f"{name} ends with its first vertex {ids[0]}"
+        remedy = f"leave the last vertex out{'' if closed else ' and set ' + CLOSED}"
+        return [Finding("error", what, *place, remedy)]
+    halts = np.flatnonzero(ids[1:] == ids[:-1])
+    if len(halts):
+        what = f"{name} has vertex {ids[halts[0]]} twice in a row, at place {halts[0]}"
+        return [Finding("error", what, *place, "remove one of them")]
     apart = np.flatnonzero(parts[ids] != parts[ids[0]])
     if len(apart):
         k = int(apart[0])
         what = f"{name} goes from vertex {ids[k - 1]} to {ids[k]}, which no edge path joins"
-        return [Finding("error", what, where, index, "keep a line on one connected part of the mesh")]
+        return [Finding("error", what, *place, "keep a line on one connected part of the mesh")]
+    values, counts = np.unique(ids, return_counts=True)
+    if (counts > 1).any():
+        what = f"{name} comes to vertex {values[np.argmax(counts > 1)]} twice"
+        return [Finding("warning", what, *place, "pick it again without going back and forth")]
     return []
 
 
