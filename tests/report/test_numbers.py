@@ -24,9 +24,9 @@ def test_values_are_printed_sensibly(value, text):
 
 
 def test_shares_are_percents_with_a_verdict():
-    rows = number_rows({"flipped_share": 0.0012, "wrong_sheet": {"lips": 0.004, "wrong_lip": 0.5}})
-    assert [row.value for row in rows] == ["0.12 %", "0.004", "50 %"]
-    assert [row.verdict for row in rows] == ["good", "", "poor"]
+    rows = number_rows({"flipped_share": 0.0012, "wrong_sheet": {"eyes": 0.004, "wrong_lip": 0.5}})
+    assert [row.value for row in rows] == ["0.12 %", "0.4 %", "50 %"]
+    assert [row.verdict for row in rows] == ["good", "fair", "poor"]
     assert rows[2].name == "Wrong sheet · wrong lip"
 
 

@@ -68,7 +68,7 @@ def heat_chart(rows: ArrayLike, *, x_label: str = "frame", y_label: str = "", cm
         f'style="image-rendering:pixelated" href="data:image/png;base64,{data}"/>'
     )
     axes = _axes((0.0, max(field.shape[1] - 1.0, 1.0)), (float(len(field)), 0.0), x_label, y_label)
-    return _svg([picture, axes], f'<span class="key">0 – {scale.high:.3g}, dark to bright</span>')
+    return _svg([axes, picture], f'<span class="key">0 – {scale.high:.3g}, dark to bright</span>')
 
 
 def _limits(values: NDArray[np.float64]) -> tuple[float, float]:

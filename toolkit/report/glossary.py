@@ -112,6 +112,10 @@ GLOSSARY: tuple[Entry, ...] = (
 
 
 def explain(name: str) -> Entry | None:
-    """Return the first entry whose pattern occurs in the last part of ``name`` (dotted), or None."""
-    leaf = name.rsplit(".", 1)[-1].lower()
-    return next((entry for entry in GLOSSARY if re.search(entry.pattern, leaf)), None)
+    """Return the first entry whose pattern occurs in the last part of ``name`` (dotted), else in all of it, or None."""
+    leaf, whole = name.rsplit(".", 1)[-1].lower(), name.lower()
+    for text in (leaf, whole):
+        for entry in GLOSSARY:
+            if re.search(entry.pattern, text):
+                return entry
+    return None
