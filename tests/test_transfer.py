@@ -1,0 +1,232 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from scipy.sparse.linalg import lsqr
+from scipy.spatial.transform import Rotation
+
+from toolkit.contacts import ContactMap, find_contacts
+from toolkit.errors import InputError
+from toolkit.feature_lines import FeatureLine, Opening, line_edges
+from toolkit.mesh import TriangleMesh
+from toolkit.transfer import DeformationTransfer, TransferParameters, deformation_gradients, line_gradients
+
+PLAIN = TransferParameters(feature_lines=False, contacts=False)
+
+
+def other_face(mesh: TriangleMesh) -> np.ndarray:
+    """The same connectivity on a clearly different rest shape."""
+    x, y, z = mesh.vertices.T
+    return np.stack([1.3 * x + 0.1 * y, 0.8 * y, 1.5 * z + 0.2 * x * y], axis=1)
+
+
+def four_vertex_transfer(
+    source: np.ndarray, shape: np.ndarray, target: np.ndarray, triangles: np.ndarray
+) -> np.ndarray:
+    """Sumner and Popovic 2004 as written: a fourth vertex for every triangle, dense least squares, vertex 0 held."""
+    n, f = len(source), len(triangles)
+
+    def spanned(vertices: np.ndarray, t: np.ndarray) -> np.ndarray:
+        a, b, c = vertices[t]
+        cross = np.cross(b - a, c - a)
+        return np.column_stack([b - a, c - a, cross / np.sqrt(np.linalg.norm(cross))])
+
+    rows, right = np.zeros((3 * f + 1, n + f)), np.zeros((3 * f + 1, 3))
+    for k, t in enumerate(triangles):
+        wanted = spanned(shape, t) @ np.linalg.inv(spanned(source, t))
+        inverse = np.linalg.inv(spanned(target, t))
+        for j in range(3):
+            # Column j of [x1 - x0, x2 - x0, x4 - x0] inverse.
+            rows[3 * k + j, [t[1], t[2], n + k]] += inverse[:, j]
+            rows[3 * k + j, t[0]] -= inverse[:, j].sum()
+            right[3 * k + j] = wanted[:, j]
+    rows[-1, 0] = 1
+    right[-1] = target[0]
+    return np.linalg.lstsq(rows, right, rcond=None)[0][:n]
+
+
+def small_patch(bump: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+    """A corner of the bump, small enough for a dense oracle."""
+    near = np.flatnonzero((bump.vertices[:, 0] < -0.2) & (bump.vertices[:, 1] < -0.3))
+    position = np.full(bump.n_vertices, -1)
+    position[near] = np.arange(len(near))
+    kept = (position[bump.triangles] >= 0).all(axis=1)
+    return bump.vertices[near], position[bump.triangles[kept]]
+
+
+def bent(vertices: np.ndarray) -> np.ndarray:
+    turn = Rotation.from_rotvec(np.outer(0.8 * vertices[:, 0], [0.2, 1.0, 0.1]))
+    return turn.apply(vertices * [1.1, 0.9, 1.2])
+
+
+def test_equals_the_four_vertex_form(bump: TriangleMesh) -> None:
+    source, triangles = small_patch(bump)
+    target = other_face(TriangleMesh(source, triangles))
+    shape = bent(source)
+    slow = four_vertex_transfer(source, shape, target, triangles)
+    transfer = DeformationTransfer(source, target, triangles, np.ones(len(source)), parameters=PLAIN)
+    quick = transfer.solve(shape[None])[0]
+    quick += (slow - quick).mean(axis=0)  # the position as a whole is the gauge's business
+    assert np.abs(quick - slow).max() < 1e-8
+    assert np.abs(slow - target).max() > 0.1
+
+
+def mouth(bump: TriangleMesh) -> tuple[Opening, list[FeatureLine]]:
+    """Two rows of the grid as an upper and a lower lip."""
+    grid = np.arange(bump.n_vertices).reshape(24, 31)
+    upper, lower = grid[6:18, 15], grid[6:18, 14]
+    lower = np.concatenate([[upper[0]], lower[1:-1], [upper[-1]]])
+    return Opening("mouth", upper, lower), [FeatureLine("upper", False, upper)]
+
+
+@pytest.mark.parametrize("with_lines", [False, True])
+def test_onto_itself_gives_the_source(bump: TriangleMesh, take: np.ndarray, with_lines: bool) -> None:
+    shapes = take[[5, 20, 33]]
+    opening, lines = mouth(bump)
+    pairs = find_contacts([opening], bump.vertices, shapes)
+    contact_map = ContactMap(pairs, bump.vertices, bump.vertices)
+    motion = np.linalg.norm(shapes - bump.vertices, axis=2).max(axis=0)
+    transfer = DeformationTransfer(
+        bump.vertices,
+        bump.vertices,
+        bump.triangles,
+        motion,
+        line_edges(lines) if with_lines else None,
+        pairs if with_lines else None,
+    )
+    result = transfer.solve(shapes, contact_map(pairs.gaps(shapes)))
+    assert np.abs(result - shapes).max() < 1e-9 * bump.diagonal
+
+
+def test_no_deformation_gives_the_target_exactly(bump: TriangleMesh) -> None:
+    target = other_face(bump)
+    transfer = DeformationTransfer(bump.vertices, target, bump.triangles, np.ones(bump.n_vertices), parameters=PLAIN)
+    assert np.abs(transfer.solve(bump.vertices[None])[0] - target).max() < 1e-12
+
+
+def test_contacts_close_what_closes(bump: TriangleMesh) -> None:
+    """The source's lips meet; the target's opening is twice as high, and meets as well with contacts only."""
+    opening, _ = mouth(bump)
+    vertices = bump.vertices.copy()
+    vertices[opening.lower[1:-1], 1] -= 0.06
+    target = vertices * [1.0, 1.0, 1.0]
+    target[opening.lower[1:-1], 1] -= 0.05
+    closed = vertices.copy()
+    closed[opening.lower[1:-1], 1] = vertices[opening.upper[1:-1], 1]
+    pairs = find_contacts([opening], vertices, closed[None])
+    assert pairs.closes.all()
+    goals = ContactMap(pairs, vertices, target)(pairs.gaps(closed[None]))
+    motion = np.linalg.norm(closed - vertices, axis=1)
+    gaps = {}
+    for contacts in (False, True):
+        parameters = TransferParameters(feature_lines=False, contacts=contacts)
+        transfer = DeformationTransfer(vertices, target, bump.triangles, motion, None, pairs, parameters)
+        gaps[contacts] = np.linalg.norm(pairs.gaps(transfer.solve(closed[None], goals)[0]), axis=1)
+    rest = np.linalg.norm(pairs.gaps(target), axis=1)
+    assert gaps[True].max() < 0.1 * rest.mean()
+    assert gaps[False].max() > 0.25 * rest.mean()
+
+
+def test_contact_map_keeps_the_rest_and_zero(bump: TriangleMesh) -> None:
+    opening, _ = mouth(bump)
+    target = other_face(bump)
+    closed = bump.vertices.copy()
+    closed[opening.lower[1:-1]] = closed[opening.upper[1:-1]]
+    pairs = find_contacts([opening], bump.vertices, closed[None])
+    contact_map = ContactMap(pairs, bump.vertices, target)
+    assert np.allclose(contact_map(pairs.gaps(bump.vertices)), pairs.gaps(target), atol=1e-14)
+    rest = np.linalg.norm(pairs.gaps(target), axis=1)
+    assert (np.linalg.norm(contact_map(np.zeros((len(pairs), 3))), axis=1) < 0.06 * rest).all()
+
+
+def test_pairs_are_nearest_points(bump: TriangleMesh) -> None:
+    opening, _ = mouth(bump)
+    pairs = find_contacts([opening], bump.vertices, np.zeros((0, bump.n_vertices, 3)))
+    for p in range(len(pairs)):
+        other = opening.lower if pairs.vertex[p] in opening.upper else opening.upper
+        rim = bump.vertices[other]
+        dense = np.concatenate(
+            [a + np.linspace(0, 1, 400)[:, None] * (b - a) for a, b in zip(rim, rim[1:], strict=False)]
+        )
+        nearest = np.linalg.norm(dense - bump.vertices[pairs.vertex[p]], axis=1).min()
+        assert np.linalg.norm(pairs.gaps(bump.vertices)[p]) == pytest.approx(nearest, abs=1e-4)
+
+
+def test_feature_lines_keep_their_shape(bump: TriangleMesh) -> None:
+    """With a large weight the target's line deforms as the source's edges do."""
+    _, lines = mouth(bump)
+    edges = line_edges(lines)
+    target, shape = other_face(bump), bent(bump.vertices)
+    errors = []
+    for weight in (0.0, 1e6):
+        parameters = TransferParameters(contacts=False, line_weight=weight)
+        transfer = DeformationTransfer(
+            bump.vertices, target, bump.triangles, np.ones(bump.n_vertices), edges, None, parameters
+        )
+        result = transfer.solve(shape[None])[0]
+        rest = target[edges[:, 1]] - target[edges[:, 0]]
+        wanted = line_gradients(bump.vertices, shape, edges, rest)
+        errors.append(np.abs(result[edges[:, 1]] - result[edges[:, 0]] - wanted).max())
+    assert errors[1] < 1e-3 * errors[0]
+
+
+def test_line_gradient_is_a_rotation_and_a_stretch() -> None:
+    rng = np.random.default_rng(1)
+    rest, shape = rng.normal(size=(2, 20, 3))
+    edges = np.stack([np.arange(10), np.arange(10, 20)], axis=1)
+    edge = rest[edges[:, 1]] - rest[edges[:, 0]]
+    new_edge = shape[edges[:, 1]] - shape[edges[:, 0]]
+    assert np.allclose(line_gradients(rest, shape, edges, edge), new_edge)
+    ratio = np.linalg.norm(new_edge, axis=1) / np.linalg.norm(edge, axis=1)
+    other = rng.normal(size=(10, 3))
+    turned = line_gradients(rest, shape, edges, other)
+    assert np.allclose(np.linalg.norm(turned, axis=1), ratio * np.linalg.norm(other, axis=1))
+    axis = np.cross(edge, new_edge)
+    assert np.allclose(line_gradients(rest, shape, edges, axis), ratio[:, None] * axis)
+    assert np.allclose(line_gradients(rest, rest, edges, other), other)
+
+
+def test_parts_stay_with_the_face(bump: TriangleMesh) -> None:
+    """A loose part that moves as a whole, such as lower teeth, moves by as much; a still one stays."""
+    n = bump.n_vertices
+    rest = np.concatenate([bump.vertices, 0.2 * bump.vertices + [0, 0, -1], 0.2 * bump.vertices + [0, 1, -1]])
+    triangles = np.concatenate([bump.triangles, bump.triangles + n, bump.triangles + 2 * n])
+    shape = rest.copy()
+    shape[:n] = rest[:n] + np.outer(np.clip(-rest[:n, 1], 0, None), [0, -0.3, 0])
+    shape[n : 2 * n] += [0, -0.3, 0.05]
+    target = rest * [1.2, 0.9, 1.1]
+    motion = np.linalg.norm(shape - rest, axis=1)
+    moved = DeformationTransfer(rest, target, triangles, motion, parameters=PLAIN).solve(shape[None])[0] - target
+    assert np.allclose(moved[n : 2 * n], [0, -0.3, 0.05], atol=1e-9)
+    assert np.abs(moved[2 * n :]).max() < 1e-9
+
+
+def test_gradients_of_a_linear_map(bump: TriangleMesh) -> None:
+    """In the plane of each triangle J is the map itself."""
+    linear = np.array([[1.1, 0.2, 0.0], [0.0, 0.8, 0.1], [0.3, 0.0, 1.0]])
+    shape = bump.vertices @ linear.T
+    gradients = deformation_gradients(bump.vertices, shape, bump.triangles)
+    edge = bump.vertices[bump.triangles[:, 1]] - bump.vertices[bump.triangles[:, 0]]
+    assert np.allclose(np.einsum("fij,fj->fi", gradients, edge), edge @ linear.T)
+    collapsed = np.array([[0, 0, 0.0], [1, 0, 0], [2, 0, 0]])
+    assert np.allclose(deformation_gradients(collapsed, 2 * collapsed, np.array([[0, 1, 2]])), np.eye(3))
+
+
+def test_the_normal_equations_are_those_of_the_energy(bump: TriangleMesh) -> None:
+    """Oracle by another solver: the stacked rows, solved iteratively."""
+    source, triangles = small_patch(bump)
+    target, shape = other_face(TriangleMesh(source, triangles)), bent(source)
+    transfer = DeformationTransfer(source, target, triangles, np.ones(len(source)), parameters=PLAIN)
+    rows = sp.vstack([transfer._gradient, sp.diags(transfer._gauge_weight) @ transfer._gauge])
+    change = (deformation_gradients(source, shape, triangles) - np.eye(3)).transpose(0, 2, 1).reshape(-1, 3)
+    held = transfer._gauge_weight[:, None] * (transfer._gauge @ (shape - source))
+    result = transfer.solve(shape[None])[0] - target
+    for c in range(3):
+        slow = lsqr(rows, np.concatenate([change[:, c], held[:, c]]), atol=1e-14, btol=1e-14, iter_lim=20000)[0]
+        assert np.abs(result[:, c] - slow).max() < 1e-7
+
+
+def test_bad_weights() -> None:
+    with pytest.raises(InputError, match="contact_weight = -1"):
+        TransferParameters(contact_weight=-1)
