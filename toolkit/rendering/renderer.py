@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 _SHADOW_TEXELS = 1024
-_SKY_DIRECTIONS = 16
+_SKY_DIRECTIONS = 12
 
 
 class Renderer:
@@ -76,7 +76,7 @@ class Renderer:
         surface = Surface(
             screen, points, normals, self._albedo(points, colors),
             self._sky(points, normals, in_view, camera, lighting), self.triangles,
-            np.array([self.material.gloss if colors is None else 0.0, self.material.sharpness]),
+            self._gloss(colors is not None),
             np.array(self.material.wrap),
         )  # fmt: skip
         background = np.array([lighting.background_top, lighting.background_bottom])
@@ -106,6 +106,11 @@ class Renderer:
         if albedo.shape != points.shape:
             raise InputError(f"{len(points)} vertices need colours of shape {points.shape}, got {albedo.shape}")
         return np.ascontiguousarray(albedo)
+
+    def _gloss(self, coloured: bool) -> Array:
+        """Strength, exponent, and the least cosine that matters; a colour map must not glitter."""
+        sharpness = self.material.sharpness
+        return np.array([0.0 if coloured else self.material.gloss, sharpness, 0.003 ** (1 / sharpness)])
 
     def _lighting(self, shading: str, coloured: bool) -> Lighting:
         if shading == "auto":

@@ -21,7 +21,8 @@ class Surface(NamedTuple):
     """The mesh as the loop needs it, a row a vertex.
 
     ``screen`` (V, 3) as in ``kernels``, ``points``, ``normals``, ``albedo`` (V, 3) with linear colours, ``sky`` (V,),
-    ``triangles`` (F, 3), ``gloss`` (2,) strength and exponent, ``wrap`` (3,).
+    ``triangles`` (F, 3), ``gloss`` (3,) strength, exponent and the cosine below which a highlight
+    is not worth computing, ``wrap`` (3,).
     """
 
     screen: Array
@@ -111,7 +112,6 @@ def _light(color: Array, corners: Corners, weights: Weights, front: bool, surfac
     ambient = weights[0] * sky[corners[0]] + weights[1] * sky[corners[1]] + weights[2] * sky[corners[2]]
     red = green = blue = ambient * inside
     highlight = 0.0
-    faintest = 0.003 ** (1.0 / surface.gloss[1])  # below it a highlight is not worth a power
     for j in range(3):
         lx, ly, lz = lights.directions[j, 0], lights.directions[j, 1], lights.directions[j, 2]
         cosine = nx * lx + ny * ly + nz * lz
@@ -123,9 +123,11 @@ def _light(color: Array, corners: Corners, weights: Weights, front: bool, surfac
         red += strength / np.pi * _wrapped(cosine, bleed * surface.wrap[0])
         green += strength / np.pi * _wrapped(cosine, bleed * surface.wrap[1])
         blue += strength / np.pi * _wrapped(cosine, bleed * surface.wrap[2])
+        if j == 1:
+            continue  # the fill is large and soft: no highlight of its own
         hx, hy, hz = lx + vx, ly + vy, lz + vz
         mirrored = (nx * hx + ny * hy + nz * hz) / max(np.sqrt(hx * hx + hy * hy + hz * hz), 1e-12)
-        if cosine > 0.0 and mirrored > faintest:
+        if cosine > 0.0 and mirrored > surface.gloss[2]:
             highlight += strength * min(cosine * 4, 1.0) * mirrored ** surface.gloss[1]
     fresnel = 1.0 + 3.0 * (1.0 - max(nx * vx + ny * vy + nz * vz, 0.0)) ** 4
     shine = surface.gloss[0] * highlight * fresnel * 0.25
