@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -146,9 +148,8 @@ def test_pairs_are_nearest_points(bump: TriangleMesh) -> None:
     for p in range(len(pairs)):
         other = opening.lower if pairs.vertex[p] in opening.upper else opening.upper
         rim = bump.vertices[other]
-        dense = np.concatenate(
-            [a + np.linspace(0, 1, 400)[:, None] * (b - a) for a, b in zip(rim, rim[1:], strict=False)]
-        )
+        along = np.linspace(0, 1, 400)[:, None]
+        dense = np.concatenate([a + along * (b - a) for a, b in pairwise(rim)])
         nearest = np.linalg.norm(dense - bump.vertices[pairs.vertex[p]], axis=1).min()
         assert np.linalg.norm(pairs.gaps(bump.vertices)[p]) == pytest.approx(nearest, abs=1e-4)
 

@@ -30,11 +30,13 @@ class BasisParameters:
 
     ``threshold`` root mean square error as a share of the take's own RMS motion (0 keeps every frame that adds
     something); ``threshold_length`` the same as a length in mesh units, if given; ``count`` the most bases, if given.
+    ``contact_share`` is how much the gaps of lids and lips count in the fit, beside the vertices.
     """
 
     threshold: float = 0.03
     threshold_length: float | None = None
     count: int | None = None
+    contact_share: float = 1.0
 
     def __post_init__(self) -> None:
         if self.threshold < 0 or (self.threshold_length or 0) < 0 or (self.count is not None and self.count < 1):
@@ -60,13 +62,8 @@ class BasisSelection:
     frame_errors: Array
 
 
-def gram_matrix(
-    deltas: NDArray[np.floating], rows: NDArray[np.floating] | None = None, progress: Progress = silent
-) -> Array:
-    """``G = X X^T`` of the frames' deltas ``(T, V, 3)``, ``(T, T)``; possibly memory-mapped, read in columns.
-
-    ``rows`` (T, R), if given, are further weighted measurements of each frame that the fit should see (contact gaps).
-    """
+def gram_matrix(deltas: NDArray[np.floating], progress: Progress = silent) -> Array:
+    """``G = X X^T`` of the frames' deltas ``(T, V, 3)``, ``(T, T)``; possibly memory-mapped, read in columns."""
     flat = deltas.reshape(len(deltas), -1)
     total = np.zeros((len(flat), len(flat)))
     for start, stop in _chunks(flat.shape[1], _CHUNK_COLUMNS):
@@ -74,24 +71,32 @@ def gram_matrix(
         # Single precision inside a chunk, double over chunks: 1e-7 of the energy, four times quicker.
         total += columns @ columns.T
         progress("comparing frames", stop, flat.shape[1])
-    if rows is not None:
-        total += np.asarray(rows, dtype=np.float64) @ np.asarray(rows, dtype=np.float64).T
     return (total + total.T) / 2
 
 
 def select_bases(
-    gram: Array, n_vertices: int, parameters: BasisParameters | None = None, progress: Progress = silent
+    gram: Array,
+    n_vertices: int,
+    parameters: BasisParameters | None = None,
+    gaps: NDArray[np.floating] | None = None,
+    progress: Progress = silent,
 ) -> BasisSelection:
     """Greedy choice (Eq. 7): each step adds the frame that lowers the total error most.
 
-    ``gram`` (T, T) from `gram_matrix`. The six frames that explain most of what is left, taken one by one, are tried
-    exactly. Still takes have no bases: K = 0.
+    ``gram`` (T, T) from `gram_matrix`. ``gaps`` (T, P, 3), if given, are the contact pairs' gaps less those at rest;
+    the choice and the weights then see their mean square beside that of the vertices, times
+    ``parameters.contact_share``. Errors are always those of the vertices. The six frames that explain most of what is
+    left, taken one by one, are tried exactly. Still takes have no bases: K = 0.
     """
     parameters = parameters or BasisParameters()
+    positions = gram
+    if gaps is not None and gaps.size:
+        rows = gaps.reshape(len(gaps), -1)
+        gram = gram + (parameters.contact_share * n_vertices / gaps.shape[1]) * (rows @ rows.T)
     energy = np.diag(gram)
-    total = float(energy.sum())
+    moved = float(np.trace(positions))
     per_length = 1 / max(len(gram) * n_vertices, 1)
-    motion = np.sqrt(max(total, 0) * per_length)
+    motion = np.sqrt(max(moved, 0) * per_length)
     goal = parameters.threshold * motion
     if parameters.threshold_length is not None:
         goal = max(goal, parameters.threshold_length) if parameters.threshold else parameters.threshold_length
@@ -104,39 +109,36 @@ def select_bases(
         candidate = _best_candidate(gram, frames, weights, alive)
         if candidate is None:
             break
-        index, new_weights, squared = candidate
-        error = np.sqrt(max(squared.sum(), 0) * per_length)
-        if error >= errors[-1] and parameters.threshold > 0:
-            break
+        index, weights = candidate
         frames.append(index)
         alive[index] = False
-        weights = new_weights
-        errors.append(float(error))
+        squared = _squared_errors(positions, np.array(frames), weights)
+        errors.append(float(np.sqrt(squared.sum() * per_length)))
         progress("choosing bases", len(frames), limit)
-    squared = _squared_errors(gram, np.array(frames, dtype=np.int64), weights)
-    return BasisSelection(
-        np.array(frames, dtype=np.int64), weights, np.array(errors), np.sqrt(np.maximum(squared, 0) / n_vertices)
-    )
+    chosen = np.array(frames, dtype=np.int64)
+    frame_errors = np.sqrt(_squared_errors(positions, chosen, weights) / n_vertices)
+    return BasisSelection(chosen, weights, np.array(errors), frame_errors)
 
 
 def _best_candidate(
     gram: Array, frames: list[int], weights: Array, alive: NDArray[np.bool_]
-) -> tuple[int, Array, Array] | None:
-    """The frame to add, with the weights (T, K + 1) and squared errors (T,) that it gives."""
+) -> tuple[int, Array] | None:
+    """The frame to add, with the weights (T, K + 1) that it gives."""
     gains = _explained(gram, frames, weights)
     gains[~alive] = -1
     short_list = np.argsort(-gains, kind="stable")[:_SHORT_LIST]
     short_list = short_list[gains[short_list] >= 0]
-    best: tuple[int, Array, Array] | None = None
+    best: tuple[int, Array] | None = None
+    least = np.inf
     for index in short_list:
         chosen = np.array([*frames, index], dtype=np.int64)
         start = np.column_stack([weights, np.zeros(len(gram))])
         trial = non_negative_weights(gram[np.ix_(chosen, chosen)], gram[:, chosen], start)
         # A basis is its own frame exactly, whatever rounding the Gram matrix has.
         trial[chosen] = np.eye(len(chosen))
-        squared = _squared_errors(gram, chosen, trial)
-        if best is None or squared.sum() < best[2].sum():
-            best = (int(index), trial, squared)
+        total = float(_squared_errors(gram, chosen, trial).sum())
+        if total < least:
+            best, least = (int(index), trial), total
     return best
 
 

@@ -9,7 +9,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["average_step", "block_to_frames", "frames_to_block", "rotate_details", "take_details"]
+__all__ = [
+    "add_head_motion",
+    "average_step",
+    "block_frames",
+    "block_to_frames",
+    "frames_to_block",
+    "rotate_details",
+    "take_details",
+]
 
 _OPTIONS = {"cache": True, "nogil": True, "fastmath": False, "boundscheck": False}
 
@@ -156,3 +164,30 @@ def rotate_details(points, triangles, neighbour, normals, details, gain, rest_de
             out[v, 0, b] = tx * x + bx * y + nx * z
             out[v, 1, b] = ty * x + by * y + ny * z
             out[v, 2, b] = tz * x + bz * y + nz * z
+
+
+@njit(**_OPTIONS)
+def block_frames(points, triangles, neighbour):
+    """Local frames ``(V, 3, 3, B)`` of a block, columns (tangent, bitangent, normal); see `local_frames`."""
+    n_vertices, _, n_frames = points.shape
+    normals = np.empty_like(points)
+    _accumulate_normals(points, triangles, normals)
+    frames = np.empty((n_vertices, 3, 3, n_frames), points.dtype)
+    for v in range(n_vertices):
+        for b in range(n_frames):
+            tx, ty, tz, bx, by, bz, nx, ny, nz = _frame_at(points, normals, neighbour, v, b)
+            frames[v, 0, 0, b], frames[v, 1, 0, b], frames[v, 2, 0, b] = tx, ty, tz
+            frames[v, 0, 1, b], frames[v, 1, 1, b], frames[v, 2, 1, b] = bx, by, bz
+            frames[v, 0, 2, b], frames[v, 1, 2, b], frames[v, 2, 2, b] = nx, ny, nz
+    return frames
+
+
+@njit(**_OPTIONS)
+def add_head_motion(points, rotations, translations, scale):
+    """Put the rigid motion on, in place: ``x_b <- scale R_b x_b + t_b``; ``points`` (V, 3, B)."""
+    for v in range(points.shape[0]):
+        for b in range(points.shape[2]):
+            x, y, z = points[v, 0, b], points[v, 1, b], points[v, 2, b]
+            for k in range(3):
+                turned = rotations[b, k, 0] * x + rotations[b, k, 1] * y + rotations[b, k, 2] * z
+                points[v, k, b] = scale * turned + translations[b, k]
