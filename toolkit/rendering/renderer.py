@@ -12,7 +12,7 @@ from toolkit.errors import InputError
 from toolkit.rendering import kernels
 from toolkit.rendering.camera import Camera
 from toolkit.rendering.overlay import Lines, Markers, draw_overlays
-from toolkit.rendering.samples import Lights, Surface, shade
+from toolkit.rendering.samples import Finish, KeyShadow, Surface, shade
 from toolkit.rendering.shading import CLAY, Lighting, Material, encode_srgb, linear_rgb
 
 __all__ = ["Renderer"]
@@ -73,16 +73,18 @@ class Renderer:
         nearness, face = kernels.rasterize(screen, self.triangles, *samples)
         in_view = _in_view(screen, samples)
         normals = kernels.smooth_normals(points, self.triangles)
-        surface = Surface(
-            screen, points, normals, self._albedo(points, colors),
-            self._sky(points, normals, in_view, camera, lighting), self.triangles,
-            self._gloss(colors is not None),
-            np.array(self.material.wrap),
-        )  # fmt: skip
-        background = np.array([lighting.background_top, lighting.background_bottom])
-        wire = np.array([wireframe * supersample / 2, 0.01, 0.01, 0.012])
-        lights = self._lights(points, in_view, camera, lighting)
-        linear = shade(face, surface, lights, background, wire, supersample)
+        sky = self._sky(points, normals, in_view, camera, lighting)
+        surface = Surface(screen, points, normals, self._albedo(points, colors), sky, self.triangles)
+        directions = _to_world(np.array([lighting.key, lighting.fill, lighting.rim]), camera)
+        linear = shade(
+            face,
+            surface,
+            self._shadow(points, in_view, directions[0], lighting),
+            self._finish(directions, camera, lighting, colors is not None),
+            np.array([lighting.background_top, lighting.background_bottom]),
+            np.array([wireframe * supersample / 2, 0.01, 0.01, 0.012]),
+            supersample,
+        )
         image = np.round(255 * encode_srgb(linear)).astype(np.uint8)
         if overlays:
             image = draw_overlays(image, overlays, points, camera, nearness)
@@ -107,11 +109,6 @@ class Renderer:
             raise InputError(f"{len(points)} vertices need colours of shape {points.shape}, got {albedo.shape}")
         return np.ascontiguousarray(albedo)
 
-    def _gloss(self, coloured: bool) -> Array:
-        """Strength, exponent, and the least cosine that matters; a colour map must not glitter."""
-        sharpness = self.material.sharpness
-        return np.array([0.0 if coloured else self.material.gloss, sharpness, 0.003 ** (1 / sharpness)])
-
     def _lighting(self, shading: str, coloured: bool) -> Lighting:
         if shading == "auto":
             shading = "soft" if coloured else "full"
@@ -132,15 +129,21 @@ class Renderer:
             )
         raise InputError(f"no shading is called {shading!r}", remedy="use auto, full, soft or none")
 
-    def _lights(self, points: Array, in_view: NDArray[np.bool_], camera: Camera, lighting: Lighting) -> Lights:
-        directions = _to_world(np.array([lighting.key, lighting.fill, lighting.rim]), camera)
-        strengths = np.array([lighting.key_strength, lighting.fill_strength, lighting.rim_strength])
-        eye = np.asarray(camera.position, dtype=np.float64)
+    def _shadow(self, points: Array, in_view: NDArray[np.bool_], light: Array, lighting: Lighting) -> KeyShadow:
         if not lighting.shadows or lighting.key_strength <= 0:
-            return Lights(directions, strengths, eye, points, np.zeros((1, 1), np.float32), 0.0)
-        coords, extent = kernels.turn_to_light(points, _light_axes(directions[0]), in_view, _SHADOW_TEXELS)
+            return KeyShadow(points, np.zeros((1, 1), np.float32), 0.0)
+        coords, extent = kernels.turn_to_light(points, _light_axes(light), in_view, _SHADOW_TEXELS)
         depth, _ = kernels.rasterize(coords, self.triangles, _SHADOW_TEXELS, _SHADOW_TEXELS)
-        return Lights(directions, strengths, eye, coords, depth, 0.004 * extent)
+        return KeyShadow(coords, depth, 0.004 * extent)
+
+    def _finish(self, directions: Array, camera: Camera, lighting: Lighting, coloured: bool) -> Finish:
+        key, fill, rim = (_triple(direction) for direction in directions)
+        strengths = (lighting.key_strength, lighting.fill_strength, lighting.rim_strength)
+        sharpness = float(self.material.sharpness)
+        # A colour map must not glitter.
+        gloss = (0.0 if coloured else float(self.material.gloss), sharpness, 0.003 ** (1 / sharpness))
+        wrap = _triple(self.material.wrap)
+        return Finish(key, fill, rim, _triple(strengths), _triple(camera.position), wrap, gloss)
 
     def _sky(
         self, points: Array, normals: Array, in_view: NDArray[np.bool_], camera: Camera, lighting: Lighting
@@ -191,6 +194,11 @@ def _light_axes(light: Array) -> Array:
     right = np.cross(helper, light)
     right /= np.linalg.norm(right)
     return np.stack([right, np.cross(light, right), light])
+
+
+def _triple(vector: Sequence[float] | Array) -> tuple[float, float, float]:
+    x, y, z = (float(c) for c in vector)
+    return x, y, z
 
 
 def _sky_directions(count: int) -> Array:

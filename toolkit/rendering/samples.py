@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from toolkit.rendering.kernels import _lit
 
-__all__ = ["Lights", "Surface", "shade"]
+__all__ = ["Finish", "KeyShadow", "Surface", "shade"]
 
 Array = NDArray[Any]
 Weights = tuple[float, float, float]
+Vector = tuple[float, float, float]
 Corners = tuple[int, int, int]
 
 
@@ -21,8 +22,7 @@ class Surface(NamedTuple):
     """The mesh as the loop needs it, a row a vertex.
 
     ``screen`` (V, 3) as in ``kernels``, ``points``, ``normals``, ``albedo`` (V, 3) with linear colours, ``sky`` (V,),
-    ``triangles`` (F, 3), ``gloss`` (3,) strength, exponent and the cosine below which a highlight
-    is not worth computing, ``wrap`` (3,).
+    ``triangles`` (F, 3).
     """
 
     screen: Array
@@ -31,26 +31,36 @@ class Surface(NamedTuple):
     albedo: Array
     sky: Array
     triangles: Array
-    gloss: Array
-    wrap: Array
 
 
-class Lights(NamedTuple):
-    """``directions`` (3, 3) unit vectors to key, fill and rim, ``strengths`` (3,), ``eye`` (3,) the camera.
+class KeyShadow(NamedTuple):
+    """The key's shadow: ``coords`` (V, 3) in ``depth_map`` (N, N), and the bias; a map of one texel means none."""
 
-    ``coords`` (V, 3), ``depth_map`` (N, N) and ``bias`` are the key's shadow; a map of one texel means none.
-    """
-
-    directions: Array
-    strengths: Array
-    eye: Array
     coords: Array
     depth_map: Array
     bias: float
 
 
+class Finish(NamedTuple):
+    """Lights and gloss, scalars only: ``strengths`` of the key, fill and rim in the unit directions to them.
+
+    ``eye`` the camera, ``wrap`` a colour each; ``gloss`` strength, exponent, and the cosine below which a highlight
+    is not worth computing.
+    """
+
+    key: Vector
+    fill: Vector
+    rim: Vector
+    strengths: Vector
+    eye: Vector
+    wrap: Vector
+    gloss: Vector
+
+
 @njit(cache=True, nogil=True, fastmath=True)
-def shade(face: Array, surface: Surface, lights: Lights, background: Array, wire: Array, supersample: int) -> Array:
+def shade(
+    face: Array, surface: Surface, shadow: KeyShadow, finish: Finish, background: Array, wire: Array, supersample: int
+) -> Array:
     """Shade every sample of ``face`` and average each pixel's in linear light: ``(h, w, 3)`` float32 in 0..1.
 
     ``background`` (2, 3) linear at top and bottom, ``wire`` (4,) line width in samples (0 for none) and its colour.
@@ -59,8 +69,11 @@ def shade(face: Array, surface: Surface, lights: Lights, background: Array, wire
     height, width = face.shape[0] // supersample, face.shape[1] // supersample
     image = np.zeros((height, width, 3), np.float32)
     share = 1.0 / (supersample * supersample)
-    lit = lights.strengths.sum() > 0.0
+    lit = finish.strengths[0] + finish.strengths[1] + finish.strengths[2] > 0.0
     color = np.empty(3)
+    # Taken out once: an array fetched from a tuple in the loop has its references counted at every sample.
+    screen, points, normals, albedo, sky, triangles = surface
+    coords, depth_map, bias = shadow
     for y in range(height * supersample):
         fade = (y + 0.5) / face.shape[0]
         for x in range(width * supersample):
@@ -69,14 +82,21 @@ def shade(face: Array, surface: Surface, lights: Lights, background: Array, wire
                 for k in range(3):
                     color[k] = background[0, k] * (1 - fade) + background[1, k] * fade
             else:
-                corners = (surface.triangles[f, 0], surface.triangles[f, 1], surface.triangles[f, 2])
-                weights, front = _barycentric(x + 0.5, y + 0.5, corners, surface.screen)
+                corners = (triangles[f, 0], triangles[f, 1], triangles[f, 2])
+                weights, front = _barycentric(x + 0.5, y + 0.5, corners, screen)
                 for k in range(3):
-                    color[k] = _mix(surface.albedo, corners, weights, k)
+                    color[k] = _mix(albedo, corners, weights, k)
                 if lit:
-                    _light(color, corners, weights, front, surface, lights)
+                    normal = _unit(_interpolate(normals, corners, weights), 1.0 if front else -1.0)
+                    at = _interpolate(points, corners, weights)
+                    eye = finish.eye
+                    view = _unit((eye[0] - at[0], eye[1] - at[1], eye[2] - at[2]), 1.0)
+                    ambient = weights[0] * sky[corners[0]] + weights[1] * sky[corners[1]] + weights[2] * sky[corners[2]]
+                    grazing = min(1.0 / max(_dot(normal, finish.key), 0.15), 4.0)
+                    clear = _unshadowed(_interpolate(coords, corners, weights), depth_map, bias * grazing)
+                    _reflect(color, normal, view, ambient, clear, 1.0 if front else 0.3, finish)
                 if wire[0] > 0.0:
-                    _draw_wire(color, x + 0.5, y + 0.5, corners, surface.screen, wire)
+                    _draw_wire(color, x + 0.5, y + 0.5, corners, screen, wire)
             for k in range(3):
                 image[y // supersample, x // supersample, k] += share * color[k]
     return image
@@ -101,75 +121,54 @@ def _barycentric(x: float, y: float, corners: Corners, screen: Array) -> tuple[W
 
 
 @njit(inline="always")
-def _light(color: Array, corners: Corners, weights: Weights, front: bool, surface: Surface, lights: Lights) -> None:
-    """Turn the albedo in ``color`` (3,) into reflected light, in place: wrapped diffuse, highlights and sky."""
-    nx, ny, nz = _direction(surface.normals, corners, weights)
-    if not front:
-        nx, ny, nz = -nx, -ny, -nz
-    vx, vy, vz = _to_eye(surface.points, corners, weights, lights.eye)
-    inside = 1.0 if front else 0.3
-    sky = surface.sky
-    ambient = weights[0] * sky[corners[0]] + weights[1] * sky[corners[1]] + weights[2] * sky[corners[2]]
-    red = green = blue = ambient * inside
-    highlight = 0.0
-    for j in range(3):
-        lx, ly, lz = lights.directions[j, 0], lights.directions[j, 1], lights.directions[j, 2]
-        cosine = nx * lx + ny * ly + nz * lz
-        strength = lights.strengths[j] * inside
-        if j == 0 and cosine > -0.3:
-            strength *= _shadow(corners, weights, cosine, lights)
+def _interpolate(values: Array, corners: Corners, weights: Weights) -> Vector:
+    return _mix(values, corners, weights, 0), _mix(values, corners, weights, 1), _mix(values, corners, weights, 2)
+
+
+@njit(inline="always")
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(inline="always")
+def _unit(a: Vector, sign: float) -> Vector:
+    scale = sign / max(np.sqrt(_dot(a, a)), 1e-12)
+    return a[0] * scale, a[1] * scale, a[2] * scale
+
+
+@njit(inline="always")
+def _unshadowed(at: Vector, depth_map: Array, bias: float) -> float:
+    """Share of the key light that arrives at a point in its map; the bias should grow where the light grazes."""
+    return _lit(depth_map, at[0], at[1], at[2] + bias, 3) if depth_map.shape[0] > 1 else 1.0
+
+
+@njit(inline="always")
+def _reflect(
+    color: Array, normal: Vector, view: Vector, ambient: float, clear: float, inside: float, finish: Finish
+) -> None:
+    """Turn the albedo in ``color`` (3,) into reflected light, in place: wrapped diffuse, highlights and sky.
+
+    ``clear`` is the share of the key that arrives, ``inside`` dims back faces.
+    """
+    to_key, to_rim = _dot(normal, finish.key), _dot(normal, finish.rim)
+    key, rim = finish.strengths[0] * inside * clear, finish.strengths[2] * inside
+    soft = finish.strengths[1] * inside * max(_dot(normal, finish.fill), 0.0) + rim * max(to_rim, 0.0)
+    even = ambient * inside + soft / np.pi
+    # The fill is large and soft: no highlight of its own.
+    shine = key * _highlight(normal, view, finish.key, to_key, finish.gloss)
+    shine += rim * _highlight(normal, view, finish.rim, to_rim, finish.gloss)
+    shine *= 0.25 * finish.gloss[0] * (1.0 + 3.0 * (1.0 - max(_dot(normal, view), 0.0)) ** 4)
+    for k in range(3):
         # Only the key bleeds round its terminator: from behind it would tint the outline.
-        bleed = 1.0 if j == 0 else 0.0
-        red += strength / np.pi * _wrapped(cosine, bleed * surface.wrap[0])
-        green += strength / np.pi * _wrapped(cosine, bleed * surface.wrap[1])
-        blue += strength / np.pi * _wrapped(cosine, bleed * surface.wrap[2])
-        if j == 1:
-            continue  # the fill is large and soft: no highlight of its own
-        hx, hy, hz = lx + vx, ly + vy, lz + vz
-        mirrored = (nx * hx + ny * hy + nz * hz) / max(np.sqrt(hx * hx + hy * hy + hz * hz), 1e-12)
-        if cosine > 0.0 and mirrored > surface.gloss[2]:
-            highlight += strength * min(cosine * 4, 1.0) * mirrored ** surface.gloss[1]
-    fresnel = 1.0 + 3.0 * (1.0 - max(nx * vx + ny * vy + nz * vz, 0.0)) ** 4
-    shine = surface.gloss[0] * highlight * fresnel * 0.25
-    color[0] = _shoulder(color[0] * red + shine)
-    color[1] = _shoulder(color[1] * green + shine)
-    color[2] = _shoulder(color[2] * blue + shine)
+        wrapped = max((to_key + finish.wrap[k]) / ((1.0 + finish.wrap[k]) * np.pi), 0.0)
+        color[k] = _shoulder(color[k] * (even + key * wrapped) + shine)
 
 
 @njit(inline="always")
-def _direction(normals: Array, corners: Corners, weights: Weights) -> Weights:
-    x, y, z = (
-        _mix(normals, corners, weights, 0),
-        _mix(normals, corners, weights, 1),
-        _mix(normals, corners, weights, 2),
-    )
-    scale = 1.0 / max(np.sqrt(x * x + y * y + z * z), 1e-12)
-    return x * scale, y * scale, z * scale
-
-
-@njit(inline="always")
-def _to_eye(points: Array, corners: Corners, weights: Weights, eye: Array) -> Weights:
-    x = eye[0] - _mix(points, corners, weights, 0)
-    y = eye[1] - _mix(points, corners, weights, 1)
-    z = eye[2] - _mix(points, corners, weights, 2)
-    scale = 1.0 / max(np.sqrt(x * x + y * y + z * z), 1e-12)
-    return x * scale, y * scale, z * scale
-
-
-@njit(inline="always")
-def _shadow(corners: Corners, weights: Weights, cosine: float, lights: Lights) -> float:
-    """Share of the key light that arrives; the bias grows where the light grazes."""
-    if lights.depth_map.shape[0] < 2:
-        return 1.0
-    x = _mix(lights.coords, corners, weights, 0)
-    y = _mix(lights.coords, corners, weights, 1)
-    near = _mix(lights.coords, corners, weights, 2) + lights.bias * min(1.0 / max(cosine, 0.15), 4.0)
-    return float(_lit(lights.depth_map, x, y, near, 3))
-
-
-@njit(inline="always")
-def _wrapped(cosine: float, wrap: float) -> float:
-    return max((cosine + wrap) / (1.0 + wrap), 0.0)
+def _highlight(normal: Vector, view: Vector, light: Vector, cosine: float, gloss: Vector) -> float:
+    halfway = _unit((light[0] + view[0], light[1] + view[1], light[2] + view[2]), 1.0)
+    mirrored = _dot(normal, halfway)
+    return min(cosine * 4, 1.0) * mirrored ** gloss[1] if cosine > 0.0 and mirrored > gloss[2] else 0.0
 
 
 @njit(inline="always")
