@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
 
 from data.eyelids import closed_lids
 from data.layout import hand_made, load_layout
 from data.package import Package
+from data.remeshing import split_quads
 from data.rims import closed_lips
+from data.subdivision import catmull_clark
+from toolkit.mesh import vertex_adjacency
 
-__all__ = ["HEADS", "SHAPES", "Head", "build_head", "face_units"]
+__all__ = ["EYES", "HEADS", "SHAPES", "Head", "build_head", "eyeballs", "face_units"]
 
 Array = NDArray[np.float64]
 
@@ -27,16 +32,25 @@ SHAPES: tuple[str, ...] = tuple(
 """The 52 ARKit names, in alphabetical order: the order of every weight array ``(T, 52)`` of the samples."""
 
 _CLOSURE_RACE = {"african_old": "african", "asian_female": "asian"}
+EYES = slice(14598, 14742)
+"""Ids of the eyeballs in the package's mesh."""
 _EYE_CENTRE_IDS = slice(13606, 13622)
+_FOREHEAD = (2.0, 7.6, 6.5, -4.0)
+"""Lower and upper end, half width and rear end of the forehead, cm from the base mesh's eyes."""
 
 
 @dataclass(frozen=True)
 class Head:
-    """One head at base resolution: ``neutral`` (4326, 3) and ``offsets`` (52, 4326, 3) of ``SHAPES``, in cm."""
+    """One head at base resolution, in cm, the eyes' centre at the origin.
+
+    ``neutral`` (4326, 3), ``offsets`` (52, 4326, 3) of ``SHAPES``, and ``eyes`` (144, 3), the control points of the
+    two eyeballs, for pictures: no shape moves them.
+    """
 
     name: str
     neutral: Array
     offsets: Array
+    eyes: Array
 
     def shape(self, weights: Array) -> Array:
         """Control points ``(4326, 3)`` of the expression ``weights`` (52,): shapes add."""
@@ -59,8 +73,15 @@ def build_head(package: Package, name: str) -> Head:
     neutral = (whole - centre)[layout.base_ids]
     neutral = neutral + closed_lips(layout, neutral)
     offsets = face_units(package) * gain[layout.base_ids, None]
-    head = Head(name, neutral, offsets)
+    head = Head(name, neutral, offsets, (whole - centre)[EYES])
     return _with_blinks(package, head, gain[layout.base_ids])
+
+
+def eyeballs(package: Package, control: Array) -> tuple[Array, NDArray[np.int32]]:
+    """Smooth eyeballs: vertices (E, 3) and triangles of the control points ``(144, 3)`` after two rounds."""
+    inside = (package.quads >= EYES.start) & (package.quads < EYES.stop)
+    eyes = catmull_clark(package.quads[inside.all(axis=1)] - EYES.start, EYES.stop - EYES.start, 2)
+    return eyes.matrix @ control, split_quads(eyes.quads[-1])
 
 
 def face_units(package: Package) -> Array:
@@ -72,7 +93,32 @@ def face_units(package: Package) -> Array:
         cure = cures.get(name, {})
         added = sum(weight * raw[other] for other, weight in cure.get("add", {}).items())
         cured.append(cure.get("scale", 1.0) * raw[name] + added)
+    brows = [k for k, name in enumerate(SHAPES) if name.startswith("brow")]
+    for k, spread in zip(brows, _over_forehead(package, [cured[k] for k in brows]), strict=True):
+        cured[k] = spread
     return np.stack(cured)
+
+
+def _over_forehead(package: Package, offsets: list[Array]) -> list[Array]:
+    """Spread offsets ``(4326, 3)`` of the brows over the forehead, up to the hairline.
+
+    The package's brows crowd all their motion into the 2 cm above them; a real forehead slides as a whole (its muscle
+    starts at the hairline). The forehead's offsets become harmonic between the brows and what does not move.
+    """
+    layout = load_layout(package)
+    points = package.vertices[layout.base_ids]
+    x, y, z = (points - package.vertices[_EYE_CENTRE_IDS].mean(0)).T
+    low, high, wide, back = _FOREHEAD
+    free = (y > low) & (y < high) & (np.abs(x) < wide) & (z > back)
+    neighbours = vertex_adjacency(split_quads(layout.quads(0)), len(points))
+    laplacian = sp.csr_matrix(sp.diags(np.asarray(neighbours.sum(1)).ravel()) - neighbours)[free]
+    solver = splu(laplacian[:, free].tocsc())
+    spread = []
+    for offset in offsets:
+        moved = offset.copy()
+        moved[free] = solver.solve(-(laplacian[:, ~free] @ offset[~free]))
+        spread.append(moved)
+    return spread
 
 
 def _with_blinks(package: Package, head: Head, gain: Array) -> Head:
@@ -83,7 +129,7 @@ def _with_blinks(package: Package, head: Head, gain: Array) -> Head:
     for side, arkit in (("left", "eyeBlinkLeft"), ("right", "eyeBlinkRight")):
         closure = package.target(f"expression/units/{race}/eye-{side}-closure")[layout.base_ids] * gain[:, None]
         offsets[SHAPES.index(arkit)] = closed_lids(layout, head.neutral, closure, side)
-    return Head(head.name, head.neutral, offsets)
+    return replace(head, offsets=offsets)
 
 
 def _muzzle(from_eyes: Array) -> Array:

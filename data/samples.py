@@ -25,7 +25,7 @@ class PerformerPaths:
     ``reference`` OBJ of quads, the neutral; ``frames`` .npy (T, V, 3) float32 with the head's motion; ``weights``
     .npy (T, 52) and ``head_motion`` .npz, from which the frames were made; ``shapes`` .npz names, neutral and offsets
     of the 52 shapes at the control points; ``subdivision`` .npz the (V, 4326) matrix; ``feature_lines`` and
-    ``landmarks`` JSON, by vertex id.
+    ``landmarks`` JSON, by vertex id; ``eyes`` PLY of the eyeballs at rest, for pictures.
     """
 
     reference: Path
@@ -36,6 +36,7 @@ class PerformerPaths:
     subdivision: Path
     feature_lines: Path
     landmarks: Path
+    eyes: Path
     fps: float = 30.0
 
 
@@ -44,7 +45,8 @@ class TargetPaths:
     """One target's files.
 
     ``reference`` PLY; ``truth`` .npz, read by ``Truth.load``; ``landmarks`` (48 pairs), ``landmarks_30`` and
-    ``feature_lines`` JSON in the shot folder's format, with ``target_vertices`` added to each line.
+    ``feature_lines`` JSON in the shot folder's format, with ``target_vertices`` added to each line; ``eyes``
+    PLY of the eyeballs, for pictures.
     """
 
     reference: Path
@@ -52,6 +54,7 @@ class TargetPaths:
     landmarks: Path
     landmarks_30: Path
     feature_lines: Path
+    eyes: Path
 
 
 @dataclass(frozen=True)
@@ -143,6 +146,7 @@ def _paths(root: Path, targets: Sequence[str]) -> SamplePaths:
         subdivision=performer / "subdivision.npz",
         feature_lines=performer / "feature_lines.json",
         landmarks=performer / "landmarks.json",
+        eyes=performer / "eyes.ply",
     )
     found = {}
     for name in targets:
@@ -153,6 +157,7 @@ def _paths(root: Path, targets: Sequence[str]) -> SamplePaths:
             landmarks=folder / "landmarks.json",
             landmarks_30=folder / "landmarks_30.json",
             feature_lines=folder / "feature_lines.json",
+            eyes=folder / "eyes.ply",
         )
     return SamplePaths(root, held, found)
 

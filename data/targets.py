@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from data.files import write_json, write_ply
-from data.heads import SHAPES, Head, build_head
+from data.heads import SHAPES, Head, build_head, eyeballs
 from data.layout import LEVELS, Layout, hand_made, load_layout
 from data.package import Package
 from data.remeshing import Density, Hole, Remesh, remesh
@@ -75,6 +75,8 @@ def build_target(package: Package, name: str, level: int, folder: Path) -> None:
     neutral = pose.points(head.neutral)
     vertices = (own @ neutral).astype(np.float32)
     write_ply(folder / "reference.ply", vertices, made.triangles)
+    eyes, eye_triangles = eyeballs(package, head.eyes)
+    write_ply(folder / "eyes.ply", pose.points(eyes).astype(np.float32), eye_triangles)
     np.savez_compressed(
         folder / "truth.npz",
         neutral=neutral,
