@@ -33,10 +33,13 @@ def write_alembic(performance: Performance, path: Path, progress: Progress) -> N
         sample = AbcGeom.OPolyMeshSchemaSample()
         sample.setFaceIndices(imath.IntArrayFromBuffer(corners))
         sample.setFaceCounts(imath.IntArrayFromBuffer(counts))
+        # One array for all frames, filled through its memory: a sample keeps every array that it was ever given.
+        positions = imath.V3fArray(performance.n_vertices)
+        sample.setPositions(positions)
+        view = np.asarray(memoryview(positions))
         for start, stop in performance.blocks():
             for frame in performance.read(start, stop):
-                positions = np.ascontiguousarray(frame, dtype=np.float32)
-                sample.setPositions(imath.V3fArrayFromBuffer(positions))
+                view[:] = frame
                 schema.set(sample)
             progress("writing Alembic", stop, performance.n_frames)
         del schema, archive  # the archive is complete when its last handle goes

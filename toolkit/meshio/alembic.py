@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,26 +53,33 @@ class _Object:
 
 def read_alembic(path: str | Path) -> TriangleMesh:
     """Read the polygon meshes of an Alembic file at its first frame, joined in the order of the archive."""
-    objects = _objects(Path(path))
-    return _mesh(objects, _times(objects)[0], path)
+    require("alembic", path)
+    with _reading(path):
+        objects = _objects(Path(path))
+        return _mesh(objects, _times(objects)[0], path)
 
 
 def open_alembic(path: Path, fps: float | None) -> FrameSequence:
     """Open an Alembic file as a take: its frames are the samples of the object that has the most."""
-    objects = _objects(path)
-    times = _times(objects)
-    mesh = _mesh(objects, times[0], path)
-    names = [item.name for item in objects]
-    sizes = [len(item.points(times[0])) for item in objects]
+    require("alembic", path)
+    with _reading(path):
+        objects = _objects(path)
+        times = _times(objects)
+        mesh = _mesh(objects, times[0], path)
+        names = [item.name for item in objects]
+        sizes = [len(item.points(times[0])) for item in objects]
 
     def read_block(start: int, stop: int) -> NDArray[np.float32]:
         block = np.zeros((stop - start, mesh.n_vertices, 3), dtype=np.float32)
         for row, frame in enumerate(range(start, stop)):
-            points = [item.points(times[frame]) for item in objects]
+            with _reading(path):
+                points = [item.points(times[frame]) for item in objects]
             block[row] = join_points(names, points, sizes, frame, path)
         return block
 
-    rate = fps or _declared_rate(objects, times)
+    rate = fps or frame_rate_of(times)
+    if fps is None and rate == 1.0:
+        rate = None  # one second a sample is Alembic's stand-in where the writer gave no time
     return FrameSequence(len(times), mesh.n_vertices, rate, str(path), read_block, mesh.triangles)
 
 
@@ -80,19 +88,23 @@ def _mesh(objects: list[_Object], time: float, path: str | Path) -> TriangleMesh
 
 
 def _objects(path: Path) -> list[_Object]:
-    require("alembic", path)
     from alembic3d import Abc
 
+    objects = list(_walk(Abc.IArchive(str(path)).getTop(), [], ""))
+    if not objects:
+        raise InputError("holds no polygon mesh", where=path, remedy="export the face's mesh into it")
+    return objects
+
+
+@contextmanager
+def _reading(path: str | Path) -> Iterator[None]:
+    """Turn what the library raises on a damaged archive into a sentence."""
     try:
-        archive = Abc.IArchive(str(path))
-        objects = list(_walk(archive.getTop(), [], ""))
+        yield
     except RuntimeError as error:
         reason = str(error).strip().splitlines()[-1:] or ["unknown reason"]
         what = f"cannot be read as an Alembic file ({reason[0].strip()})"
         raise InputError(what, where=path, remedy="it is damaged or cut short, export it again") from error
-    if not objects:
-        raise InputError("holds no polygon mesh", where=path, remedy="export the face's mesh into it")
-    return objects
 
 
 def _walk(parent: Any, transforms: list[Any], prefix: str) -> Iterator[_Object]:
@@ -110,20 +122,10 @@ def _walk(parent: Any, transforms: list[Any], prefix: str) -> Iterator[_Object]:
 
 
 def _times(objects: list[_Object]) -> NDArray[np.float64]:
-    schemas = _schemas(objects)
+    schemas = [schema for item in objects for schema in (item.schema, *item.transforms)]
     longest = max(schemas, key=lambda schema: schema.getNumSamples())
     sampling = longest.getTimeSampling()
     return np.array([sampling.getSampleTime(i) for i in range(longest.getNumSamples())] or [0.0], dtype=np.float64)
-
-
-def _declared_rate(objects: list[_Object], times: NDArray[np.float64]) -> float | None:
-    # One second a sample is Alembic's stand-in where the writer gave no time.
-    rate = frame_rate_of(times)
-    return None if rate == 1.0 else rate
-
-
-def _schemas(objects: list[_Object]) -> list[Any]:
-    return [schema for item in objects for schema in (item.schema, *item.transforms)]
 
 
 def _at(time: float) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -24,15 +26,17 @@ def read_gltf(path: str | Path) -> TriangleMesh:
     Vertices are the file's ``POSITION`` rows. Programs that write glTF split vertices at texture seams and hard
     edges, so the ids are the file's, not those of the model it came from.
     """
-    file, scene = _load(Path(path))
-    return _mesh(scene, file.path)
+    with _sound_document(path):
+        return _mesh(GltfScene(GltfFile(path)), path)
 
 
 def open_gltf(path: Path, fps: float | None) -> FrameSequence:
     """Open the first animation that moves a mesh, sampled at ``fps`` (by default the rate its keys lie on)."""
-    file, scene = _load(path)
-    mesh = _mesh(scene, path)
-    clip = moving_clip(file, scene.influences)
+    with _sound_document(path):
+        file = GltfFile(path)
+        scene = GltfScene(file)
+        mesh = _mesh(scene, path)
+        clip = moving_clip(file, scene.influences)
     rate = fps or clip.frame_rate()
     n_frames = int(np.floor(clip.duration * rate + 0.01)) + 1
 
@@ -45,15 +49,16 @@ def open_gltf(path: Path, fps: float | None) -> FrameSequence:
     return FrameSequence(n_frames, mesh.n_vertices, rate, str(path), read_block, mesh.triangles)
 
 
-def _load(path: Path) -> tuple[GltfFile, GltfScene]:
-    file = GltfFile(path)
+@contextmanager
+def _sound_document(path: str | Path) -> Iterator[None]:
+    """Turn what a document with missing or wrong entries raises into a sentence."""
     try:
-        return file, GltfScene(file)
-    except (IndexError, KeyError, TypeError) as error:
+        yield
+    except (AttributeError, IndexError, KeyError, TypeError) as error:
         what = f"the document does not hold together ({type(error).__name__}: {error})"
         raise InputError(what, where=path, remedy="it is damaged, export it again") from error
 
 
-def _mesh(scene: GltfScene, path: Path) -> TriangleMesh:
+def _mesh(scene: GltfScene, path: str | Path) -> TriangleMesh:
     faces = scene.faces()
     return build_mesh(scene.vertices({}), np.full(len(faces), 3), faces.ravel(), where=path)
