@@ -120,3 +120,18 @@ def test_stated_units_scale_the_scene_to_metres(tmp_path, make, validate):
     export(performance, tmp_path / "a.glb", "gltf")
     np.testing.assert_allclose(read_mesh(tmp_path / "a.glb").vertices, 0.01 * performance.rest, atol=1e-7)
     assert validate(tmp_path / "a.glb")["issues"]["numErrors"] == 0
+
+
+def test_normals_follow_the_morph_targets(tmp_path, performance):
+    from toolkit.mesh import vertex_normals
+    from toolkit.meshio.gltf_file import GltfFile
+
+    export(performance, tmp_path / "a.glb", "gltf")
+    file = GltfFile(tmp_path / "a.glb")
+    primitive = file.items("meshes")[0]["primitives"][0]
+    rest = file.accessor(primitive["attributes"]["NORMAL"])
+    outward = performance.rest[:-1] - [1, 2, 3]  # the last vertex is lone, in the middle
+    assert (np.sum(rest[:-1] * outward, axis=1) > 8).all()
+    shaped = rest + file.accessor(primitive["targets"][1]["NORMAL"])
+    expected = vertex_normals(performance.morphs[1], performance.triangles)
+    np.testing.assert_allclose(shaped[:-1], expected[:-1], atol=1e-6)

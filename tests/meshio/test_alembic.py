@@ -10,7 +10,7 @@ FRAMES = np.random.default_rng(0).normal(size=(6, 5, 3)).astype(np.float32)
 COUNTS, CORNERS = [4, 3], [3, 2, 1, 0, 4, 2, 3]  # clockwise, as Alembic has it
 
 
-def write(path, frames=FRAMES, fps=25.0, move=True, counts=COUNTS, corners=CORNERS):
+def write(path, frames=FRAMES, fps=25.0, counts=COUNTS, corners=CORNERS, scale=(1, 1, 1)):
     """A skin under a transform that moves, and a still eye beside it."""
     import imath
     from alembic3d import Abc, AbcCoreAbstract, AbcGeom
@@ -18,9 +18,10 @@ def write(path, frames=FRAMES, fps=25.0, move=True, counts=COUNTS, corners=CORNE
     archive = Abc.OArchive(str(path))
     sampling = archive.addTimeSampling(AbcCoreAbstract.TimeSampling(1 / fps, 0.0)) if fps else 0
     parent = AbcGeom.OXform(archive.getTop(), "head", sampling)
-    for t in range(len(frames) if move else 1):
+    for t in range(len(frames)):
         sample = AbcGeom.XformSample()
         sample.setTranslation(imath.V3d(t, 0, 0))
+        sample.setScale(imath.V3d(*scale))
         parent.getSchema().set(sample)
     for name, points in (("skin", frames), ("eye", FRAMES[:1] + 9)):
         schema = AbcGeom.OPolyMesh(parent if name == "skin" else archive.getTop(), name, sampling).getSchema()
@@ -48,6 +49,12 @@ def test_objects_are_joined_with_moving_transforms(tmp_path):
     np.testing.assert_array_equal(mesh.polygons.counts, [4, 3, 4, 3])
     np.testing.assert_array_equal(mesh.polygons.indices[:7], [0, 1, 2, 3, 3, 2, 4])
     np.testing.assert_array_equal(sequence.triangles, mesh.triangles)
+
+
+def test_a_mirroring_transform_turns_the_faces(tmp_path):
+    mesh = read_mesh(write(tmp_path / "a.abc", scale=(-1, 1, 1)))
+    np.testing.assert_array_equal(mesh.vertices[:5], FRAMES[0] * [-1, 1, 1])
+    np.testing.assert_array_equal(mesh.polygons.indices[:7], CORNERS)
 
 
 def test_frame_rate(tmp_path):

@@ -36,8 +36,9 @@ class _Object:
         sample = self.schema.getValue(_at(time))
         counts = np.array(memoryview(sample.getFaceCounts()))
         indices = np.array(memoryview(sample.getFaceIndices()))
-        # Alembic's winding is clockwise seen from outside; ours is counter-clockwise.
-        if int(counts.sum()) == len(indices):
+        # Alembic's winding is clockwise seen from outside, ours counter-clockwise; a mirroring transform turns it.
+        mirrored = np.linalg.det(self._world(time)[:3, :3]) < 0
+        if not mirrored and int(counts.sum()) == len(indices):
             indices = reverse_faces(counts, indices)
         return Piece(self.name, self.points(time), counts, indices)
 
