@@ -3,8 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from toolkit.contacts import ContactPairs
 from toolkit.rendering.takes import View
 from toolkit.report import ReportData, build, sections
+from toolkit.report.measures import contact_gaps, detail_energy, jitter
 from toolkit.report.pictures import bases_figures, coating_figures, motion_figures, registration_figures
 from toolkit.smoothing import SmoothingFilter, SmoothingParameters
 
@@ -56,8 +58,8 @@ def test_detail_energy_is_the_rms_length():
     details = np.zeros((3, 4, 3), np.float32)
     details[1, :, 0] = 2
     details[2, 0] = (3, 4, 0)
-    assert sections.per_frame_rms(details) == pytest.approx([0, 2, 2.5])
-    assert sections.per_frame_rms(details, np.array([True, False, False, False])) == pytest.approx([0, 2, 5])
+    assert detail_energy(details) == pytest.approx([0, 2, 2.5])
+    assert detail_energy(details, np.array([2.0, 0, 0, 0])) == pytest.approx([0, 2, 5])
 
 
 @pytest.mark.parametrize("count", [1, 3, 20])
@@ -70,8 +72,8 @@ def test_all_sections_make_one_page(count):
                 sections.performance_section([]),
                 sections.registration_section([], {"flips": 0}),
                 sections.decomposition_section([], {}),
-                sections.bases_section([], weights, 1 / np.arange(1, count + 1), "cm", {}),
-                sections.transfer_section([], {"lip gap": np.zeros(30)}, "cm", {}),
+                sections.bases_section([], weights, 1 / np.arange(1, count + 2), "cm", {}),
+                sections.transfer_section([], {"lips": {"source": np.zeros(30), "result": np.ones(30)}}, {}),
                 sections.details_section(np.ones(30), None, "cm", {}),
                 sections.timings_section({"register": 1.25, "bases": 2.5}, {}),
             ],
@@ -80,3 +82,29 @@ def test_all_sections_make_one_page(count):
     assert page.count("</i>basis") == (count if 1 < count <= 6 else 0)
     assert '<td>Total (s)</td><td class="value">3.75</td>' in page.replace("\n", "")
     assert page.count("<section") == 7
+
+
+def test_gaps_are_shares_of_the_width_by_opening():
+    # Two openings of width 2 and 4 with one pair each, which open by 0.1 t.
+    pairs = ContactPairs(
+        vertex=np.array([2, 6]),
+        edge=np.array([[3, 3], [7, 7]]),
+        share=np.zeros(2),
+        closes=np.ones(2, bool),
+        corners=np.array([[0, 1], [4, 5]]),
+    )
+    rest = np.zeros((8, 3))
+    rest[1, 0], rest[5, 0] = 2, 4
+    frames = np.stack([rest + np.eye(8)[:, [2]] * [0, 0.1 * t, 0] for t in range(4)])
+    gaps = contact_gaps(lambda a, b: frames[a:b], 4, rest, pairs, ["eye", "mouth"])
+    assert list(gaps) == ["eye", "mouth"]
+    assert gaps["eye"] == pytest.approx([0, 5, 10, 15])
+    assert gaps["mouth"] == pytest.approx([0, 0, 0, 0])
+
+
+def test_jitter_is_blind_to_steady_motion():
+    t = np.arange(6.0)[:, None, None]
+    steady = np.tile(t, (1, 4, 3))
+    shaking = steady + 0.5 * (-1.0) ** t
+    assert jitter(lambda a, b: steady[a:b], 6, 4) == pytest.approx(0, abs=1e-12)
+    assert jitter(lambda a, b: shaking[a:b], 6, 4) == pytest.approx(2 * np.sqrt(3))

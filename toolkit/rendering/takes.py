@@ -29,8 +29,9 @@ class View:
     """One performance as it is looked at.
 
     ``label`` for its row, ``triangles`` (F, 3), ``rest`` (V, 3) which the camera is fixed on, ``n_frames``,
-    ``frame`` reads the positions (V, 3) of one frame, ``forward`` from the face to its viewer and ``up`` in its frame
-    of reference.
+    ``frame`` reads the positions (V, 3) of one frame and may be called from several threads, ``forward`` from the face
+    to its viewer and ``up`` in its frame of reference, ``focus`` (N,) the vertices that the camera frames, all by
+    default.
     """
 
     label: str
@@ -41,6 +42,7 @@ class View:
     material: Material = CLAY
     forward: tuple[float, float, float] = (0.0, 0.0, 1.0)
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    focus: NDArray[np.integer] | None = None
 
     def camera(
         self, aspect: float, *, turn: float = 0.0, only: NDArray[np.integer] | None = None, margin: float = 0.08
@@ -49,7 +51,8 @@ class View:
 
         The rest face has its mouth shut, so a little more room is left than it needs.
         """
-        points = self.rest if only is None else self.rest[only]
+        focus = self.focus if only is None else only
+        points = self.rest if focus is None else self.rest[focus]
         front = Camera.facing(points, self.forward, self.up, aspect=aspect)
         toward = np.subtract(front.orbited(azimuth=turn).position, front.target)
         return Camera.facing(points, toward, self.up, aspect=aspect, margin=margin)

@@ -76,12 +76,12 @@ GLOSSARY: tuple[Entry, ...] = (
         "Frame-to-frame trembling, measured by second differences. The result's should not exceed the source's.",
     ),
     Entry(
-        r"residual|basis_error|rms_error|bases.*error",
+        r"residual|error_rms|error_share",
         "What the bases leave out of the source's large motion. If an expression looks weak, ask for more "
         "bases or a lower threshold.",
     ),
     Entry(
-        r"^n_bases|(^|_)k$|n_selected",
+        r"^n?_?bases$",
         "How many frames serve as bases. Ten to thirty is usual for a take.",
     ),
     Entry(

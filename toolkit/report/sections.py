@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from toolkit.report.charts import heat_chart, line_chart
 from toolkit.report.data import Chart, Figure, Section
@@ -60,12 +60,12 @@ def decomposition_section(figures: Sequence[Figure], numbers: Numbers) -> Sectio
 def bases_section(
     figures: Sequence[Figure], weights: ArrayLike, errors: ArrayLike, unit: str, numbers: Numbers
 ) -> Section:
-    """The chosen frames, their weights ``(T, K)`` over time and the error ``(K,)`` with the first k of them."""
+    """The chosen frames, their weights ``(T, K)`` over time, and the error ``(K + 1,)`` with the first 0..K of them."""
     table, curve = np.asarray(weights, dtype=np.float64), np.asarray(errors, dtype=np.float64)
     charts = []
     if curve.size:
-        svg = line_chart({"error": curve}, x=np.arange(1, len(curve) + 1), x_label="bases", y_label=f"RMS ({unit})")
-        charts.append(Chart(svg, "What is left of the motion after each basis; it should level off."))
+        svg = line_chart({"error": curve}, x_label="bases", y_label=f"RMS ({unit})")
+        charts.append(Chart(svg, "What is left of the motion with so many bases; it should level off."))
     if table.size and table.shape[1] <= _MOST_CURVES:
         curves = {f"basis {k + 1}": table[:, k] for k in range(table.shape[1])}
         charts.append(Chart(line_chart(curves, y_label="weight"), "How much of each basis is in each frame."))
@@ -83,17 +83,18 @@ def bases_section(
 
 
 def transfer_section(
-    figures: Sequence[Figure], curves: Mapping[str, ArrayLike], unit: str, numbers: Numbers
+    figures: Sequence[Figure], gaps: Mapping[str, Mapping[str, ArrayLike]], numbers: Numbers
 ) -> Section:
-    """Quality of the large-scale transfer; ``curves`` (T,) each, such as the gap between lips in every frame."""
+    """Quality of the large-scale transfer; ``gaps`` names an opening and gives its curves (T,) by face."""
     charts = [
-        Chart(line_chart({name: values}, y_label=unit), f"{name} in every frame.") for name, values in curves.items()
+        Chart(line_chart(pair, y_label="gap (% of width)"), f"{name}: mean gap between its rims in every frame.")
+        for name, pair in gaps.items()
     ]
     return Section(
         "Transfer",
         "The bases' motion carried to the target by deformation transfer, with lips and lids made to meet where the "
-        "source's do. The colours show how far each point moves: the pattern should match between the two faces, "
-        "the amounts differ with their size.",
+        "source's do: the two curves of an opening should touch the ground in the same frames. The colours show how "
+        "far each point moves; the pattern should match between the two faces.",
         figures,
         charts,
         numbers,
@@ -120,12 +121,3 @@ def timings_section(seconds: Mapping[str, float], numbers: Numbers) -> Section:
     if len(seconds) > 1:
         rows["total (s)"] = round(sum(seconds.values()), 2)
     return Section("Timings", "Time of each stage when it last ran.", numbers={**rows, **numbers})
-
-
-def per_frame_rms(details: NDArray[np.floating], mask: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
-    """Root mean square length ``(T,)`` of details (T, V, 3), read frame by frame so that they may be memory-mapped."""
-    energy = np.empty(len(details))
-    for t, frame in enumerate(details):
-        rows = np.asarray(frame, dtype=np.float64) if mask is None else np.asarray(frame, dtype=np.float64)[mask]
-        energy[t] = np.sqrt(np.mean(np.sum(rows * rows, axis=1)))
-    return energy

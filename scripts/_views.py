@@ -1,0 +1,36 @@
+"""Options that the scripts which render have in common."""
+
+from __future__ import annotations
+
+import argparse
+
+__all__ = ["add_axes", "numbers_list", "vector"]
+
+
+def add_axes(parser: argparse.ArgumentParser) -> None:
+    """Which way the source's face looks; on the target the registration tells."""
+    parser.add_argument(
+        "--forward", type=vector, default=(0.0, 0.0, 1.0), metavar="X,Y,Z", help="out of the source's face (0,0,1)"
+    )
+    parser.add_argument(
+        "--up", type=vector, default=(0.0, 1.0, 0.0), metavar="X,Y,Z", help="up in the source's files (0,1,0)"
+    )
+
+
+def vector(text: str) -> tuple[float, float, float]:
+    """Parse ``X,Y,Z``."""
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not three numbers X,Y,Z") from None
+    if x == y == z == 0:
+        raise argparse.ArgumentTypeError("a direction cannot be 0,0,0")
+    return x, y, z
+
+
+def numbers_list(text: str) -> list[int]:
+    """Parse frame numbers ``0,12,40``."""
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of frame numbers such as 0,12,40") from None

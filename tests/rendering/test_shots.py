@@ -1,0 +1,111 @@
+"""Shots rendered and reported from disk: a small take on one topology, so that no registration is needed."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.spatial.transform import Rotation
+
+from toolkit.errors import InputError
+from toolkit.mesh import TriangleMesh
+from toolkit.meshio import write_mesh
+from toolkit.rendering.shots import expressive_frames, open_views
+from toolkit.shot import Shot, ShotConfig, SourceInput, TargetInput, save_config
+from toolkit.stages import run_stages
+
+ROOT = Path(__file__).resolve().parents[2]
+N_FRAMES = 7
+
+
+@pytest.fixture(scope="module")
+def shot(tmp_path_factory) -> Shot:
+    """A ball that bulges in frame 4 and dents in frame 6; the target is wider, larger and lies on its side."""
+    import trimesh
+
+    folder = tmp_path_factory.mktemp("wide one")
+    mesh = trimesh.creation.icosphere(subdivisions=3)
+    rest, triangles = np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int32)
+    front = np.exp(-8 * ((rest - [0, 0, 1]) ** 2).sum(axis=1))[:, None]
+    amount = np.array([0, 0.02, 0.05, 0.2, 0.5, 0.1, -0.4])[:, None, None]
+    np.save(folder / "frames.npy", (rest * (1 + amount * front)).astype(np.float32))
+    wide = Rotation.from_euler("x", 90, degrees=True).apply(3 * rest * [1.2, 1, 1])
+    write_mesh(folder / "source.ply", TriangleMesh(rest, triangles))
+    write_mesh(folder / "target.ply", TriangleMesh(wide, triangles))
+    source = SourceInput(Path("source.ply"), Path("frames.npy"), 25.0)
+    save_config(folder / "shot.toml", ShotConfig(source, TargetInput(Path("target.ply"))))
+    made = Shot(folder)
+    run_stages(made)
+    return made
+
+
+def _run(script: str, *arguments: object) -> dict:
+    command = [sys.executable, str(ROOT / "scripts" / script), "--json", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_views_look_at_the_same_side_of_both_faces(shot):
+    views = open_views(shot)
+    assert views.source.n_frames == views.target.n_frames == N_FRAMES
+    assert views.fps == 25
+    assert views.target.forward == pytest.approx((0, -1, 0), abs=0.01)
+    assert views.target.up == pytest.approx((0, 0, 1), abs=0.01)
+    assert views.face_heights[1] / views.face_heights[0] == pytest.approx(3.2, abs=0.3)
+    assert views.target.frame(0) == pytest.approx(views.target.rest, abs=0.05)
+
+
+def test_the_extremes_and_the_calm_frame_are_chosen(shot):
+    assert expressive_frames(shot, 3) == [0, 4, 6]
+
+
+def test_render_makes_sheet_maps_and_video(shot):
+    av = pytest.importorskip("av")
+    options = ["--frames", "0,4,6", "--width", 60, "--height", 80, "--every", 2]
+    made = _run(
+        "render.py", shot.path, *options, "--video", "--map", "motion", "--map", "coating", "--map", "registration"
+    )
+    names = [Path(path).name for path in made["files"]]
+    assert names == ["contact_sheet.png", "motion.png", "coating.png", "registration.png", "performance.mp4"]
+    assert all(Path(path).parent == shot.render_folder for path in made["files"])
+    sheet = Image.open(made["files"][0])
+    assert sheet.width > 180
+    assert sheet.height > 150
+    with av.open(made["files"][-1]) as container:
+        stream = container.streams.video[0]
+        assert sum(1 for _ in container.decode(stream)) == 4
+        assert (stream.width, stream.height) == (128, 80)
+        assert float(stream.average_rate) == pytest.approx(12.5)
+
+
+def test_what_cannot_be_rendered_is_said(shot, tmp_path):
+    command = [sys.executable, str(ROOT / "scripts" / "render.py"), str(shot.path)]
+    for arguments, sentence in (
+        (["--frames", "0,99"], "frame 99 is not in the take, which has 7 frames"),
+        (["--close-up", "mouth"], "too few landmarks are named after the mouth"),
+        (["--video", "--every", "0"], "--every 0 makes no sense"),
+    ):
+        done = subprocess.run([*command, *arguments], capture_output=True, text=True, check=False, timeout=300)
+        assert done.returncode == 2, done.stderr
+        assert sentence in done.stderr
+    unfinished = tmp_path / "new"
+    unfinished.mkdir()
+    (unfinished / "shot.toml").write_text((shot.path / "shot.toml").read_text())
+    with pytest.raises(InputError, match="has not been run"):
+        open_views(Shot(unfinished))
+
+
+def test_the_report_tells_the_whole_story(shot):
+    path = Path(_run("report.py", shot.path, "--count", 3)["report"])
+    page = path.read_text(encoding="utf-8")
+    assert path == shot.report_path
+    for text in ("Registration", "Bases", "Transfer", "Wrinkles", "Timings", "result/frames.npy", "target.ply"):
+        assert text in page, text
+    assert page.count("<img") >= 10
+    assert "nan" not in page.split("</style>")[1].replace("data:image", "").split("base64")[0]

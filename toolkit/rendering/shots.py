@@ -1,0 +1,98 @@
+"""A shot as views: the performance and its result, framed alike."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolkit.meshio import FrameSequence
+from toolkit.rendering.regions import face_vertices
+from toolkit.rendering.shading import BONE, SKIN
+from toolkit.rendering.takes import View, choose_frames
+from toolkit.rigid import Similarity
+from toolkit.shot import Shot
+from toolkit.stages.inputs import load_landmark_pairs, load_mesh, load_sequence
+from toolkit.stages.register import load_pose
+
+__all__ = ["ShotViews", "expressive_frames", "open_views"]
+
+Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class ShotViews:
+    """``source`` and ``target`` (the result) on one topology, ``landmarks`` name to vertex, ``fps`` of the take.
+
+    ``face_heights`` of source and target, in their own units, are what relative numbers refer to.
+    """
+
+    source: View
+    target: View
+    landmarks: dict[str, int]
+    fps: float
+    face_heights: tuple[float, float]
+
+
+def open_views(shot: Shot, *, forward: Vector = (0.0, 0.0, 1.0), up: Vector = (0.0, 1.0, 0.0)) -> ShotViews:
+    """Open a shot whose stages have been run.
+
+    ``forward`` (out of the face) and ``up`` are the source's axes; the registration says where they lie on the target.
+    Raises InputError where the result is missing.
+    """
+    result = shot.array("result", "frames")
+    source, pose, sequence = load_mesh(shot, "source"), load_pose(shot), load_sequence(shot)
+    marks = load_landmark_pairs(shot)
+    landmarks = {name: int(vertex) for name, vertex in zip(marks.names, marks.source, strict=True)}
+    focus = face_vertices(source.vertices, landmarks)
+    shown = source.vertices if focus is None else source.vertices[focus]
+    height = float(np.ptp(shown @ np.asarray(up) / np.linalg.norm(up)))
+    performance = View(
+        "source",
+        source.triangles,
+        source.vertices,
+        sequence.n_frames,
+        reader_of(sequence),
+        SKIN,
+        forward,
+        up,
+        focus,
+    )
+    retargeted = replace(
+        performance,
+        label=shot.path.resolve().name,
+        rest=np.array(shot.array("register", "target_vertices")),
+        frame=lambda t: np.array(result[t]),
+        material=BONE,
+        forward=_turned(pose, forward),
+        up=_turned(pose, up),
+    )
+    heights = (height, height * pose.scale)
+    return ShotViews(performance, retargeted, landmarks, float(sequence.fps or 30.0), heights)
+
+
+def expressive_frames(shot: Shot, count: int) -> list[int]:
+    """Choose ``count`` frames of the take that differ most in shape, the calmest first among them."""
+    deltas = shot.array("decompose", "smooth_deltas")
+    shapes = np.array(deltas[:, :: max(1, deltas.shape[1] // 500)]).reshape(len(deltas), -1)
+    return choose_frames(shapes, count, first=int(np.argmin(np.linalg.norm(shapes, axis=1))))
+
+
+def reader_of(sequence: FrameSequence) -> Callable[[int], NDArray[np.floating]]:
+    """Read single frames; one at a time, since not every format's reader can be shared between threads."""
+    lock = threading.Lock()
+
+    def frame(index: int) -> NDArray[np.floating]:
+        with lock:
+            return sequence.read(index, index + 1)[0]
+
+    return frame
+
+
+def _turned(pose: Similarity, direction: Vector) -> Vector:
+    x, y, z = (float(c) for c in pose.rotation @ np.asarray(direction))
+    return x, y, z

@@ -1,0 +1,166 @@
+"""Gather a shot's report from what its stages left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from toolkit.contacts import ContactPairs
+from toolkit.progress import Progress, silent
+from toolkit.rendering.shots import ShotViews, expressive_frames, open_views
+from toolkit.rendering.takes import View, performance_sheet
+from toolkit.report import sections
+from toolkit.report.data import Figure, ReportData, Section
+from toolkit.report.maps import shot_registration_figures
+from toolkit.report.measures import contact_gaps, detail_energy, jitter
+from toolkit.report.pictures import bases_figures, coating_figures, motion_figures
+from toolkit.shot import Shot
+from toolkit.stages import STAGES
+from toolkit.stages.bases import load_pairs
+from toolkit.stages.decompose import source_decomposer
+from toolkit.stages.inputs import load_sequence
+from toolkit.stages.register import load_target
+
+__all__ = ["report_data"]
+
+Vector = tuple[float, float, float]
+_UNIT = "unit of the file"
+
+
+def report_data(
+    shot: Shot,
+    *,
+    forward: Vector = (0.0, 0.0, 1.0),
+    up: Vector = (0.0, 1.0, 0.0),
+    frames: int = 6,
+    progress: Progress = silent,
+) -> ReportData:
+    """Render and measure what the report shows; the stages must have been run."""
+    views = open_views(shot, forward=forward, up=up)
+    chosen = expressive_frames(shot, frames)
+    steps = (
+        lambda: _performance(views, chosen),
+        lambda: _registration(shot, views),
+        lambda: _decomposition(shot, views, chosen),
+        lambda: _bases(shot, views),
+        lambda: _transfer(shot, views, chosen),
+        lambda: _details(shot),
+        lambda: _timings(shot),
+    )
+    made: list[Section] = []
+    for step in steps:
+        made.append(step())
+        progress("making the report", len(made), len(steps))
+    numbers = _numbers(shot, "inputs")
+    subtitle = f"{views.source.n_frames} frames at {views.fps:g} a second · {len(views.source.rest):,} vertices"
+    return ReportData(
+        f"{views.target.label}: facial performance transfer", subtitle, _summary(shot, numbers), made, _links(shot)
+    )
+
+
+def _performance(views: ShotViews, chosen: list[int]) -> Section:
+    sheet = performance_sheet([views.source, views.target], chosen, width=300)
+    return sections.performance_section([Figure(sheet, wide=True)])
+
+
+def _registration(shot: Shot, views: ShotViews) -> Section:
+    return sections.registration_section(shot_registration_figures(shot, views), _numbers(shot, "register"))
+
+
+def _decomposition(shot: Shot, views: ShotViews, chosen: list[int]) -> Section:
+    energy = np.array(shot.array("decompose", "detail_energy"))
+    wrinkled = chosen[int(np.argmax(energy[chosen]))]
+    figures = coating_figures(views.source, wrinkled, source_decomposer(shot).filter, _UNIT)
+    return sections.decomposition_section(figures, _numbers(shot, "decompose"))
+
+
+def _bases(shot: Shot, views: ShotViews) -> Section:
+    frames = np.array(shot.array("bases", "frames"))
+    rest, deltas = source_decomposer(shot).rest.smooth, shot.array("decompose", "smooth_deltas")
+    source = np.array([rest + deltas[t] for t in frames]).reshape(-1, *rest.shape)
+    # The bases were solved in the source's pose and size, so the source's axes serve for both.
+    target = View(
+        "", views.source.triangles, load_target(shot).vertices, len(frames), lambda t: rest, views.target.material,
+        views.source.forward, views.source.up, views.source.focus,
+    )  # fmt: skip
+    bases = np.array(shot.array("transfer", "bases"))
+    return sections.bases_section(
+        bases_figures([(views.source, source), (target, bases)], frames),
+        np.array(shot.array("bases", "weights")),
+        np.array(shot.array("bases", "errors")),
+        _UNIT,
+        _numbers(shot, "bases"),
+    )
+
+
+def _transfer(shot: Shot, views: ShotViews, chosen: list[int]) -> Section:
+    deltas = shot.array("decompose", "smooth_deltas")
+    strongest = max(chosen, key=lambda t: float(np.abs(deltas[t]).max()))
+    numbers: dict[str, Any] = dict(_numbers(shot, "transfer"))
+    sequence, result = load_sequence(shot), shot.array("result", "frames")
+    size = float(_numbers(shot, "register").get("size_ratio", 1.0))
+    before = size * jitter(sequence.read, sequence.n_frames, sequence.n_vertices)
+    after = jitter(lambda a, b: result[a:b], len(result), sequence.n_vertices)
+    numbers |= {"jitter_of_source_scaled": before, "jitter_of_result": after}
+    pairs, names = load_pairs(shot), list(_numbers(shot, "bases").get("openings", []))
+    gaps = _gaps(shot, views, pairs, names)
+    for name, curves in gaps.items():
+        closed = curves["source"] < 2.0
+        if closed.any():
+            numbers[f"largest gap of {name}, % of width, where the source is closed"] = float(
+                curves["result"][closed].max()
+            )
+    return sections.transfer_section(motion_figures([views.source, views.target], strongest, _UNIT), gaps, numbers)
+
+
+def _gaps(shot: Shot, views: ShotViews, pairs: ContactPairs, names: list[str]) -> dict[str, dict[str, np.ndarray]]:
+    sequence, result = load_sequence(shot), shot.array("result", "frames")
+    source = contact_gaps(sequence.read, sequence.n_frames, views.source.rest, pairs, names)
+    target = contact_gaps(lambda a, b: result[a:b], len(result), views.target.rest, pairs, names)
+    return {name: {"source": source[name], "result": target[name]} for name in source}
+
+
+def _details(shot: Shot) -> Section:
+    gain = np.array(shot.array("transfer", "gain"))
+    energy = detail_energy(shot.array("decompose", "details"), gain)
+    numbers = {"gain": shot.config.details.gain, "method": shot.config.details.method}
+    return sections.details_section(np.array(shot.array("decompose", "detail_energy")), energy, _UNIT, numbers)
+
+
+def _timings(shot: Shot) -> Section:
+    manifests = {name: shot.manifest(name) for name in STAGES}
+    return sections.timings_section({name: float(m["seconds"]) for name, m in manifests.items() if m}, {})
+
+
+def _numbers(shot: Shot, stage: str) -> Mapping[str, Any]:
+    numbers = (shot.manifest(stage) or {}).get("numbers", {})
+    return numbers if isinstance(numbers, Mapping) else {}
+
+
+def _summary(shot: Shot, numbers: Mapping[str, Any]) -> dict[str, Any]:
+    config = shot.config
+    parameters = {
+        name: {key: value for table in m["parameters"].values() for key, value in table.items()}
+        for name in STAGES
+        if (m := shot.manifest(name)) and m.get("parameters") and name not in ("transfer", "result")
+    }
+    parameters["transfer"] = (shot.manifest("transfer") or {}).get("parameters", {}).get("transfer", {})
+    inputs = {
+        "source": config.source.reference.name,
+        "frames": config.source.frames.name,
+        "target": config.target.reference.name,
+    }
+    return {"files": inputs, **{k: v for k, v in numbers.items() if k != "findings"}, "parameters": parameters,
+            **{f"finding {k + 1}": text for k, text in enumerate(numbers.get("findings", []))}}  # fmt: skip
+
+
+def _links(shot: Shot) -> list[tuple[str, str]]:
+    """Whatever lies beside the report, by relative addresses, so that the folder can be moved as a whole."""
+    found: list[Path] = [shot.frames_path]
+    for folder in (shot.export_folder, shot.render_folder):
+        found += sorted(folder.iterdir()) if folder.is_dir() else []
+    relative = [path.relative_to(shot.path).as_posix() for path in found if path.exists()]
+    return [(name, name) for name in relative]
