@@ -82,6 +82,10 @@ class DeformationTransfer:
         parameters = parameters or TransferParameters()
         self.source, self.target, self.triangles = source, target, triangles
         self._gradient = gradient(target, triangles)
+        # G^T J^T = (G^T E^-T) E'^T: one sparse product a shape, and no gradient is ever formed.
+        inverse, _ = _inverse_edge_frames(source, triangles)
+        self._pull = sp.csr_matrix(self._gradient.T @ _block_diagonal(inverse.transpose(0, 2, 1)))
+        self._pull_at_rest = self._pull @ _edge_frames(source, triangles).transpose(0, 2, 1).reshape(-1, 3)
         self._edges = edges if edges is not None and parameters.feature_lines else np.zeros((0, 2), dtype=np.int64)
         self._pairs = pairs if pairs is not None and parameters.contacts and len(pairs) else None
         blocks = [self._gradient]
@@ -93,6 +97,11 @@ class DeformationTransfer:
             sum((rows.T @ rows for rows in blocks if rows.shape[0]), start=sp.csc_matrix((len(target), len(target))))
         )
         self.factor: Factor = factorise(self.matrix)
+
+    @property
+    def has_contacts(self) -> bool:
+        """Whether contact pairs are part of the system."""
+        return self._pairs is not None
 
     def _line_rows(self, parameters: TransferParameters) -> sp.csr_matrix:
         weight = parameters.line_weight
@@ -118,41 +127,65 @@ class DeformationTransfer:
         self._contacts = self._contact_scale * self._pairs.rows(n)
         return self._contacts
 
-    def solve(self, shapes: NDArray[np.floating], goals: Array | None = None, progress: Progress = silent) -> Array:
+    def solve(self, shapes: NDArray[np.floating], goals: Array | None = None) -> Array:
         """Target shapes ``(K, V, 3)`` for source shapes ``(K, V, 3)``; ``goals`` (K, P, 3) the contact pairs' gaps."""
-        right = np.empty((len(self.target), 3 * len(shapes)))
-        for k, shape in enumerate(shapes):
-            goal = None if goals is None else goals[k]
-            right[:, 3 * k : 3 * k + 3] = self.right_hand_side(np.asarray(shape, dtype=np.float64), goal)
-            progress("transferring bases", k + 1, len(shapes))
-        moved = self.factor.solve(right) if len(shapes) else right
-        return self.target + moved.reshape(len(self.target), -1, 3).transpose(1, 0, 2)
+        right = self.right_hand_sides(shapes)
+        if goals is not None:
+            right += self.contact_forces(goals)
+        return self.solve_for(right)
 
-    def right_hand_side(self, shape: Array, goal: Array | None) -> Array:
-        """Right-hand side ``(V, 3)`` of one shape."""
-        change = deformation_gradients(self.source, shape, self.triangles) - np.eye(3)
-        # Row 3f + i, column c of the gradient's side holds d x_c / d x_i: the transpose of J.
-        right = self._gradient.T @ change.transpose(0, 2, 1).reshape(-1, 3)
+    def solve_for(self, right: Array) -> Array:
+        """Target shapes ``(K, V, 3)`` for right-hand sides ``(K, V, 3)``."""
+        columns = right.transpose(1, 0, 2).reshape(len(self.target), -1)
+        return self.target + self.factor.solve(columns).reshape(len(self.target), -1, 3).transpose(1, 0, 2)
+
+    def right_hand_sides(self, shapes: NDArray[np.floating], progress: Progress = silent) -> Array:
+        """What the source shapes ``(K, V, 3)`` ask for, contacts aside, ``(K, V, 3)``."""
+        right = np.empty((len(shapes), len(self.target), 3))
+        for k, shape in enumerate(shapes):
+            right[k] = self._right_hand_side(np.asarray(shape, dtype=np.float64))
+            progress("transferring bases", k + 1, len(shapes))
+        return right
+
+    def contact_forces(self, goals: Array) -> Array:
+        """What the contact pairs' gaps ``(K, P, 3)`` add to the right-hand sides, ``(K, V, 3)``."""
+        if self._pairs is None:
+            return np.zeros((len(goals), len(self.target), 3))
+        pull = self._contact_scale * (goals - self._pairs.gaps(self.target))
+        return np.stack([np.asarray(self._contacts.T @ one) for one in pull])
+
+    def _right_hand_side(self, shape: Array) -> Array:
+        spanned = _edge_frames(shape, self.triangles).transpose(0, 2, 1).reshape(-1, 3)
+        right = self._pull @ spanned - self._pull_at_rest
         if len(self._edges):
             turned = line_gradients(self.source, shape, self._edges, self._line_direction) - self._line_direction
             right += self._lines.T @ (self._line_scale[:, None] * turned)
-        if self._pairs is not None and goal is not None:
-            right += self._contacts.T @ (self._contact_scale * (goal - self._pairs.gaps(self.target)))
         right += self._gauge.T @ (self._gauge_weight[:, None] ** 2 * (self._gauge @ (shape - self.source)))
         return np.asarray(right)
 
 
 def deformation_gradients(rest: Array, shape: Array, triangles: NDArray[np.integer]) -> Array:
     """``J_f`` (F, 3, 3) with ``J_f [e0 e1 n] = [e0' e1' n']``, ``n = e0 x e1 / sqrt(|e0 x e1|)`` (Eq. 10, Sumner)."""
-    before, after = _edge_frames(rest, triangles), _edge_frames(shape, triangles)
-    determinant = np.linalg.det(before)
-    scale = np.abs(before).max(axis=(1, 2)) ** 3
-    flat = np.abs(determinant) <= 1e-12 * np.maximum(scale, 1e-300)
-    # A collapsed triangle says nothing about the deformation.
-    before[flat] = np.eye(3)
-    gradients = after @ np.linalg.inv(before)
+    inverse, flat = _inverse_edge_frames(rest, triangles)
+    gradients = np.asarray(_edge_frames(shape, triangles) @ inverse)
     gradients[flat] = np.eye(3)
     return gradients
+
+
+def _inverse_edge_frames(vertices: Array, triangles: NDArray[np.integer]) -> tuple[Array, NDArray[np.bool_]]:
+    """Inverses ``(F, 3, 3)``, zero for collapsed triangles, which say nothing about the deformation; and which are."""
+    frames = _edge_frames(vertices, triangles)
+    e0, e1, n = (frames[:, :, k] for k in range(3))
+    rows = np.stack([np.cross(e1, n), np.cross(n, e0), np.cross(e0, e1)], axis=1)
+    determinant = np.sum(e0 * rows[:, 0], axis=1)
+    flat = np.abs(determinant) <= 1e-12 * np.maximum(np.abs(frames).max(axis=(1, 2)) ** 3, 1e-300)
+    scale = np.where(flat, 0, 1 / np.where(flat, 1, determinant))
+    return rows * scale[:, None, None], flat
+
+
+def _block_diagonal(blocks: Array) -> sp.bsr_matrix:
+    n = len(blocks)
+    return sp.bsr_matrix((blocks, np.arange(n), np.arange(n + 1)), shape=(3 * n, 3 * n))
 
 
 def _edge_frames(vertices: Array, triangles: NDArray[np.integer]) -> Array:

@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from toolkit.mesh import TriangleMesh
+from toolkit.operators import gradient
+from toolkit.solve import SingularMatrixError, factorise
+
+
+def _system(mesh: TriangleMesh) -> sp.csc_matrix:
+    rows = gradient(mesh.vertices, mesh.triangles)
+    return sp.csc_matrix(rows.T @ rows + 1e-3 * sp.identity(mesh.n_vertices))
+
+
+@pytest.mark.parametrize("columns", [0, 1, 3, 128, 129, 300])
+def test_as_a_dense_solve(bump: TriangleMesh, columns: int) -> None:
+    matrix = _system(bump)
+    right = np.random.default_rng(1).normal(size=(bump.n_vertices, columns))
+    dense = np.linalg.solve(matrix.toarray(), right)
+    assert np.allclose(factorise(matrix).solve(right), dense, rtol=1e-8, atol=1e-8 * np.abs(dense).max(initial=1))
+
+
+def test_one_right_hand_side_keeps_its_shape(bump: TriangleMesh) -> None:
+    matrix = _system(bump)
+    x = np.linspace(0, 1, bump.n_vertices)
+    solved = factorise(matrix).solve(matrix @ x)
+    assert solved.shape == x.shape
+    assert np.abs(solved - x).max() < 1e-9
+
+
+def test_a_floating_part_is_refused() -> None:
+    """A Laplacian without a gauge leaves a constant free."""
+    path = sp.diags([[-1.0] * 9, [1.0, *[2.0] * 8, 1.0], [-1.0] * 9], [-1, 0, 1])
+    with pytest.raises(SingularMatrixError, match="10 x 10"):
+        factorise(sp.block_diag([path]))
+    with pytest.raises(SingularMatrixError):
+        factorise(sp.csc_matrix((5, 5)))
+
+
+def test_shapes_are_checked(bump: TriangleMesh) -> None:
+    with pytest.raises(ValueError, match="square"):
+        factorise(sp.csc_matrix((3, 4)))
+    with pytest.raises(ValueError, match="5 rows"):
+        factorise(_system(bump)).solve(np.zeros(5))
