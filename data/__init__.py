@@ -4,7 +4,8 @@
 answers. ``python -m data.build OUT`` writes the same to a folder.
 """
 
+from data.heads import SHAPES
 from data.samples import PerformerPaths, SamplePaths, TargetPaths, ensure_samples
 from data.targets import TARGETS, Truth
 
-__all__ = ["TARGETS", "PerformerPaths", "SamplePaths", "TargetPaths", "Truth", "ensure_samples"]
+__all__ = ["SHAPES", "TARGETS", "PerformerPaths", "SamplePaths", "TargetPaths", "Truth", "ensure_samples"]

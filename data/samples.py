@@ -88,7 +88,16 @@ def ensure_samples(
     """
     cache = Path(cache_dir) if cache_dir is not None else default_cache()
     root = cache / f"level{level}-{fingerprint()}"
-    return build_samples(root, progress, targets, level, cache)
+    paths = build_samples(root, progress, targets, level, cache)
+    _prune(cache, f"level{level}-*", root)
+    return paths
+
+
+def _prune(cache: Path, pattern: str, current: Path) -> None:
+    """Remove what an older version of the code built, but for the last one: another process may be reading it."""
+    older = sorted((path for path in cache.glob(pattern) if path != current), key=lambda path: path.stat().st_mtime)
+    for path in older[:-1]:
+        shutil.rmtree(path, ignore_errors=True)
 
 
 def build_samples(

@@ -127,6 +127,7 @@ def _another_topology(layout: Layout, head: Head, level: int) -> Remesh:
         Density(skull, 0),
         Density(face, 3.5, features),
         Density(face, 1.5, ears),
+        Density(rim, 0.4, ears),
         Density(rim, 0.8, features),
     ]
     lines = {name: layout.arc(name, LEVELS) for name in ("lip_outer_upper", "lip_outer_lower")}
