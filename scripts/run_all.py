@@ -1,0 +1,32 @@
+#!/usr/bin/env python3
+"""Steps 1 to 5: from a shot's files to result/frames.npy, skipping what is up to date."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import Any
+
+from _cli import parser_for, print_stages, run
+
+from toolkit.progress import Progress
+
+
+def main(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
+    """Run all stages."""
+    from toolkit.shot import Shot
+    from toolkit.stages import run_stages
+
+    shot = Shot(options.shot)
+    reports = run_stages(shot, force=options.force, progress=progress)
+    print_stages(reports)
+    print(f"result: {shot.frames_path}")
+    seconds = {report.stage: report.seconds for report in reports}
+    numbers = {report.stage: report.numbers for report in reports}
+    return {"result": str(shot.frames_path), "total_s": sum(seconds.values()), "stages": seconds, "numbers": numbers}
+
+
+if __name__ == "__main__":
+    made = parser_for(__doc__)
+    made.add_argument("--force", action="store_true", help="run every step anew")
+    sys.exit(run(made, main))

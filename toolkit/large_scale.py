@@ -1,0 +1,76 @@
+"""Bases on the target whose contacts hold on the surface that the user sees.
+
+Lips and lids must meet on the detailed surface, but the transfer solves for the smoothed one. The difference, the
+detail's own offset at a contact pair, depends on the solution only through the turning of local frames, so a few
+substitutions with the same factor settle it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolkit.contacts import ContactPairs
+from toolkit.decomposition import Decomposer
+from toolkit.mesh.geometry import local_frames
+from toolkit.progress import Progress, silent
+from toolkit.transfer import DeformationTransfer
+
+__all__ = ["LocalDetails", "transfer_bases"]
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 3
+
+
+class LocalDetails:
+    """Detail displacements at a few vertices of the target, for whole shapes."""
+
+    def __init__(self, target: Decomposer, vertices: NDArray[np.integer]) -> None:
+        triangles = np.asarray(target.mesh.triangles)
+        near = triangles[np.isin(triangles, vertices).any(axis=1)]
+        self._ids = np.unique(np.concatenate([near.ravel(), vertices, target.rest.neighbour[vertices]]))
+        self._triangles = np.searchsorted(self._ids, near)
+        self._at = np.searchsorted(self._ids, vertices)
+        # Frames are asked for at the given vertices only: elsewhere triangles are missing, any neighbour does.
+        self._neighbour = np.zeros(len(self._ids), dtype=np.int64)
+        self._neighbour[self._at] = np.searchsorted(self._ids, target.rest.neighbour[vertices])
+        self._own = target.rest.detail[vertices]
+        self.vertices = vertices
+
+    def displacement(self, shape: Array, detail: Array) -> Array:
+        """``G (e_0' + detail)`` (n, 3) at the vertices, for a smoothed shape (V, 3) and details (n, 3) there."""
+        frames = local_frames(shape[self._ids], self._triangles, self._neighbour)[self._at]
+        return np.asarray(np.einsum("vij,vj->vi", frames, self._own + detail))
+
+
+def transfer_bases(
+    system: DeformationTransfer,
+    target: Decomposer,
+    shapes: Array,
+    details: NDArray[np.floating],
+    gain: Array,
+    pairs: ContactPairs,
+    goals: Array,
+    progress: Progress = silent,
+) -> Array:
+    """Transfer the smoothed source shapes ``(K, V, 3)``; returns the target's smoothed bases ``(K, V, 3)``.
+
+    ``details`` (K, V, 3) the source's motion details in the same frames, ``gain`` (V,) their factor, ``goals``
+    (K, P, 3) the gaps that the visible target should have.
+    """
+    right = system.right_hand_sides(shapes, progress)
+    if not system.has_contacts or not len(shapes):
+        return system.solve_for(right)
+    ids = pairs.vertices
+    local = LocalDetails(target, ids)
+    spread = np.zeros_like(target.rest.smooth)
+    moved = np.asarray(details[:, ids], dtype=np.float64) * gain[ids, None]
+    bases = np.broadcast_to(target.rest.smooth, shapes.shape)
+    for _ in range(_ROUNDS):
+        offsets = np.empty_like(goals)
+        for k, basis in enumerate(bases):
+            spread[ids] = local.displacement(basis, moved[k])
+            offsets[k] = pairs.gaps(spread)
+        bases = system.solve_for(right + system.contact_forces(goals - offsets))
+    return bases

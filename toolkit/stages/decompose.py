@@ -1,0 +1,49 @@
+"""Stage "decompose": the head's motion, the smoothed frames and the motion details of the performance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.decomposition import Decomposer, decompose_sequence
+from toolkit.progress import Progress
+from toolkit.shot import Shot, StageFolder
+from toolkit.stabilisation import HeadMotion, fit_head_motion
+from toolkit.stages.inputs import load_mesh, load_sequence
+
+__all__ = ["load_motion", "source_decomposer", "work"]
+
+
+def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
+    """Stabilise and split every frame."""
+    sequence = load_sequence(shot)
+    decomposer = source_decomposer(shot)
+    enabled = shot.config.stabilise.enabled
+    motion = fit_head_motion(sequence, decomposer.mesh.vertices, enabled=enabled, progress=progress)
+    folder.save("rotations", motion.rotations)
+    folder.save("translations", motion.translations)
+    shape = (sequence.n_frames, sequence.n_vertices, 3)
+    smooth_deltas, details = folder.create("smooth_deltas", shape), folder.create("details", shape)
+    decompose_sequence(sequence, decomposer, motion, smooth_deltas, details, progress)
+    folder.save("detail_energy", _rms_per_frame(details))
+    cosine = np.clip((np.trace(motion.rotations, axis1=1, axis2=2) - 1) / 2, -1, 1)
+    folder.numbers |= {
+        "head_turns_degrees": float(np.degrees(np.arccos(cosine)).max()),
+        "head_moves": float(np.sqrt((motion.translations**2).sum(axis=1)).max()),
+        "smoothing_steps": shot.config.smoothing.resolved(decomposer.mesh).steps,
+    }
+
+
+def source_decomposer(shot: Shot) -> Decomposer:
+    """The source's smoothing and local frames, as the stage used them."""
+    return Decomposer(load_mesh(shot, "source"), shot.config.smoothing)
+
+
+def load_motion(shot: Shot) -> HeadMotion:
+    """The head's motion that was taken out."""
+    rotations, translations = shot.array("decompose", "rotations"), shot.array("decompose", "translations")
+    return HeadMotion(np.array(rotations), np.array(translations))
+
+
+def _rms_per_frame(details: np.ndarray) -> np.ndarray:
+    """RMS length of the motion detail in each frame, ``(T,)``: how wrinkled the face is."""
+    return np.array([np.sqrt(np.mean(np.einsum("vi,vi->v", frame, frame))) for frame in details])

@@ -1,0 +1,119 @@
+"""The order of the stages, what each depends on, and running those that are not up to date."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from toolkit.errors import InputError
+from toolkit.progress import Progress, silent
+from toolkit.shot import Shot, StageFolder
+from toolkit.shot.hashing import key_of
+from toolkit.stages import bases, decompose, inputs, register, result, transfer
+
+__all__ = ["STAGES", "Stage", "StageReport", "current_key", "run_stages"]
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step: what it is called, the stages and parameter tables it depends on, and its work.
+
+    ``version`` is part of the key: raise it when the same inputs give other arrays.
+    """
+
+    name: str
+    after: tuple[str, ...]
+    tables: tuple[str, ...]
+    work: Callable[[Shot, StageFolder, Progress], None]
+    version: int = 1
+
+
+STAGES: dict[str, Stage] = {
+    stage.name: stage
+    for stage in (
+        Stage("inputs", (), (), inputs.work),
+        Stage("register", ("inputs",), ("register",), register.work),
+        Stage("decompose", ("inputs",), ("stabilise", "smoothing"), decompose.work),
+        Stage("bases", ("decompose",), ("bases",), bases.work),
+        Stage("transfer", ("register", "bases"), ("smoothing", "transfer", "details"), transfer.work),
+        Stage("result", ("transfer",), ("smoothing", "details"), result.work),
+    )
+}
+
+
+@dataclass(frozen=True)
+class StageReport:
+    """What happened to a stage: ``skipped`` if it was up to date, its ``numbers``, and the ``seconds`` it took."""
+
+    stage: str
+    skipped: bool
+    seconds: float
+    numbers: dict[str, Any]
+
+
+def run_stages(
+    shot: Shot, names: Sequence[str] | None = None, *, force: bool = False, progress: Progress = silent
+) -> list[StageReport]:
+    """Run the named stages (all by default) and whatever they need that is not up to date, in order.
+
+    ``force`` runs the named ones even if they are up to date.
+    """
+    wanted = list(names) if names is not None else list(STAGES)
+    for name in wanted:
+        if name not in STAGES:
+            raise InputError(f"there is no stage {name!r}", remedy=f"the stages are {', '.join(STAGES)}")
+    needed = _with_earlier(wanted)
+    shot.remove_leftovers()
+    reports = []
+    for name, stage in STAGES.items():
+        if name in needed:
+            reports.append(_run(shot, stage, force and name in wanted, progress))
+    return reports
+
+
+def current_key(shot: Shot, name: str) -> str:
+    """The key that this stage has with the shot's present files and parameters."""
+    stage = STAGES[name]
+    parts: dict[str, Any] = {"stage": name, "version": stage.version}
+    parts["after"] = {earlier: current_key(shot, earlier) for earlier in stage.after}
+    parts["parameters"] = _parameters(shot, stage)
+    if name == "inputs":
+        parts["files"] = {label: shot.hashes.of(path) for label, path in inputs.files(shot).items()}
+        # Formats without a frame rate take it from here; the frames themselves do not depend on it.
+        parts["fps"] = shot.config.source.fps
+    return key_of(parts)
+
+
+def _run(shot: Shot, stage: Stage, force: bool, progress: Progress) -> StageReport:
+    key = current_key(shot, stage.name)
+    if not force and shot.is_current(stage.name, key):
+        manifest = shot.manifest(stage.name) or {}
+        log.info("%s: up to date", stage.name)
+        return StageReport(stage.name, True, 0.0, manifest.get("numbers", {}))
+    log.info("%s: running", stage.name)
+    began = time.perf_counter()
+    with shot.write_stage(stage.name, key, _parameters(shot, stage)) as folder:
+        stage.work(shot, folder, progress)
+    seconds = time.perf_counter() - began
+    log.info("%s: done in %.1f s", stage.name, seconds)
+    return StageReport(stage.name, False, seconds, folder.numbers)
+
+
+def _parameters(shot: Shot, stage: Stage) -> dict[str, Any]:
+    return {table: asdict(getattr(shot.config, table)) for table in stage.tables}
+
+
+def _with_earlier(names: Sequence[str]) -> set[str]:
+    needed: set[str] = set()
+    waiting = list(names)
+    while waiting:
+        name = waiting.pop()
+        if name not in needed:
+            needed.add(name)
+            waiting += STAGES[name].after
+    return needed

@@ -1,0 +1,70 @@
+"""Stage "transfer": the bases on the target, by deformation gradients, feature lines and contacts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.contacts import ContactMap
+from toolkit.decomposition import Decomposer
+from toolkit.details import detail_gain
+from toolkit.feature_lines import line_edges
+from toolkit.large_scale import transfer_bases
+from toolkit.progress import Progress
+from toolkit.shot import Shot, StageFolder
+from toolkit.stages.bases import load_pairs
+from toolkit.stages.decompose import source_decomposer
+from toolkit.stages.inputs import load_lines
+from toolkit.stages.register import load_target
+from toolkit.transfer import DeformationTransfer
+
+__all__ = ["target_decomposer", "work"]
+
+
+def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
+    """Factorise once, solve for all bases."""
+    source = source_decomposer(shot)
+    target = target_decomposer(shot, source)
+    pairs = load_pairs(shot)
+    frames = np.array(shot.array("bases", "frames"))
+    deltas, details = shot.array("decompose", "smooth_deltas"), shot.array("decompose", "details")
+    shapes = (
+        np.stack([source.rest.smooth + deltas[t] for t in frames]) if len(frames) else np.zeros((0, *deltas.shape[1:]))
+    )
+    motion = _motion(deltas)
+    progress("factorising", 0, 1)
+    system = DeformationTransfer(
+        source.rest.smooth,
+        target.rest.smooth,
+        source.mesh.triangles,
+        motion,
+        line_edges(load_lines(shot)),
+        pairs,
+        shot.config.transfer,
+    )
+    progress("factorising", 1, 1)
+    gain = detail_gain(shot.config.details, source.rest.smooth, target.rest.smooth, source.mesh.triangles)
+    gaps = np.array(shot.array("bases", "pair_gaps"))
+    goals = ContactMap(pairs, source.mesh.vertices, target.mesh.vertices)(gaps[1:][frames])
+    bases = transfer_bases(system, target, shapes, details[frames], gain, pairs, goals, progress)
+    folder.save("bases", bases)
+    folder.save("rest", target.rest.smooth)
+    folder.save("gain", gain)
+    folder.save("motion", motion)
+    folder.numbers |= {
+        "bases": len(bases),
+        "feature_line_edges": len(line_edges(load_lines(shot))) if shot.config.transfer.feature_lines else 0,
+        "contact_pairs": len(pairs) if shot.config.transfer.contacts else 0,
+    }
+
+
+def target_decomposer(shot: Shot, source: Decomposer) -> Decomposer:
+    """The target's smoothing and local frames, on the source's frame neighbours."""
+    return Decomposer(load_target(shot), shot.config.smoothing.resolved(source.mesh), source.rest.neighbour)
+
+
+def _motion(deltas: np.ndarray) -> np.ndarray:
+    """How far each vertex moves at most over the take, ``(V,)``."""
+    farthest = np.zeros(deltas.shape[1])
+    for frame in deltas:
+        np.maximum(farthest, np.einsum("vi,vi->v", frame, frame), out=farthest)
+    return np.sqrt(farthest)
