@@ -77,7 +77,8 @@ def _close_ups(
                 remedy="name them in landmarks.json, such as eye_inner_l, mouth_corner_r, brow_mid_l",
             )
         aspect, width = CLOSE_UPS[name][2], round(1.4 * options.width)
-        sheet = performance_sheet(_views(opened), frames, width=width, aspect=aspect, only=only, progress=progress)
+        steady = [opened[0].steady()[0], *(views.steady()[1] for views in opened)]
+        sheet = performance_sheet(steady, frames, width=width, aspect=aspect, only=only, progress=progress)
         paths.append(_save(sheet, folder / f"contact_sheet_{name}.png"))
     return paths
 
@@ -85,13 +86,11 @@ def _close_ups(
 def _map(
     shots: list[Shot], opened: list[ShotViews], name: str, frames: list[int], folder: Path, progress: Progress
 ) -> Path:
-    from toolkit.rendering.sheet import contact_sheet
-    from toolkit.report.maps import map_rows
+    from toolkit.report.maps import map_sheet
 
-    rows = map_rows(name, shots, opened, frames)
+    sheet = map_sheet(name, shots, opened, frames)
     progress(f"rendering the map of the {name}", 1, 1)
-    columns = [] if name == "registration" else [f"frame {index}" for index in frames]
-    return _save(contact_sheet(rows, columns), folder / f"{name}.png")
+    return _save(sheet, folder / f"{name}.png")
 
 
 def _video(opened: list[ShotViews], path: Path, options: argparse.Namespace, progress: Progress) -> Path:
@@ -117,7 +116,8 @@ def _save(image: Any, path: Path) -> Path:
     return path
 
 
-if __name__ == "__main__":
+def parser() -> argparse.ArgumentParser:
+    """The options."""
     made = parser_for(__doc__, shot=False)
     made.add_argument("shots", metavar="DIR", nargs="+", type=Path, help="shot folders")
     made.add_argument("--count", type=int, default=6, metavar="N", help="frames on the sheets, chosen to differ (6)")
@@ -137,4 +137,8 @@ if __name__ == "__main__":
     made.add_argument("--title", default="", help="written on the contact sheet")
     made.add_argument("--out", metavar="FOLDER", help="where to write (DIR/render)")
     add_axes(made)
-    sys.exit(run(made, main))
+    return made
+
+
+if __name__ == "__main__":
+    sys.exit(run(parser(), main))

@@ -29,9 +29,14 @@ def main(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     return {"report": str(path)}
 
 
-if __name__ == "__main__":
+def parser() -> argparse.ArgumentParser:
+    """The options."""
     made = parser_for(__doc__)
     add_axes(made)
     made.add_argument("--count", type=int, default=6, metavar="N", help="frames on the contact sheet (6)")
     made.add_argument("--out", metavar="FILE", help="where to write it (DIR/report.html)")
-    sys.exit(run(made, main))
+    return made
+
+
+if __name__ == "__main__":
+    sys.exit(run(parser(), main))

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -80,7 +82,7 @@ def test_all_sections_make_one_page(count):
         )
     )
     assert page.count("</i>basis") == (count if 1 < count <= 6 else 0)
-    assert '<td>Total (s)</td><td class="value">3.75</td>' in page.replace("\n", "")
+    assert re.search(r"<td>Total \(s\)</td><td[^>]*>3.75</td>", page.replace("\n", ""))
     assert page.count("<section") == 7
 
 

@@ -26,9 +26,9 @@ class Material:
     wrap: Vector = (0.10, 0.05, 0.03)
 
 
-CLAY = Material((0.52, 0.48, 0.44))
-SKIN = Material((0.60, 0.44, 0.36), wrap=(0.12, 0.06, 0.04))
-BONE = Material((0.52, 0.53, 0.55), wrap=(0.05, 0.05, 0.05))
+CLAY = Material((0.47, 0.435, 0.40))
+SKIN = Material((0.55, 0.40, 0.325), wrap=(0.12, 0.06, 0.04))
+BONE = Material((0.405, 0.42, 0.45), wrap=(0.05, 0.05, 0.05))
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class Lighting:
     opens the other side, the rim draws the outline. ``sky`` light comes from everywhere and is dimmed by occlusion.
     """
 
-    key: Vector = (-0.60, 0.66, 0.46)
-    key_strength: float = 3.3
+    key: Vector = (-0.62, 0.66, 0.42)
+    key_strength: float = 3.2
     fill: Vector = (0.85, 0.10, 0.55)
     fill_strength: float = 0.30
     rim: Vector = (0.80, 0.45, -0.55)

@@ -15,6 +15,8 @@ from toolkit.rendering.shading import BONE, SKIN
 from toolkit.rendering.takes import View, choose_frames
 from toolkit.rigid import Similarity
 from toolkit.shot import Shot
+from toolkit.stabilisation import HeadMotion
+from toolkit.stages.decompose import load_motion
 from toolkit.stages.inputs import load_landmark_pairs, load_mesh, load_sequence
 from toolkit.stages.register import load_pose
 
@@ -28,7 +30,8 @@ Vector = tuple[float, float, float]
 class ShotViews:
     """``source`` and ``target`` (the result) on one topology, ``landmarks`` name to vertex, ``fps`` of the take.
 
-    ``face_heights`` of source and target, in their own units, are what relative numbers refer to.
+    ``face_heights`` of source and target, in their own units, are what relative numbers refer to; ``motions`` the
+    head's motion of each.
     """
 
     source: View
@@ -36,6 +39,11 @@ class ShotViews:
     landmarks: dict[str, int]
     fps: float
     face_heights: tuple[float, float]
+    motions: tuple[HeadMotion, HeadMotion]
+
+    def steady(self) -> tuple[View, View]:
+        """Source and target without the head's motion, so that a close-up stays on its part of the face."""
+        return _held_still(self.source, self.motions[0]), _held_still(self.target, self.motions[1])
 
 
 def open_views(shot: Shot, *, forward: Vector = (0.0, 0.0, 1.0), up: Vector = (0.0, 1.0, 0.0)) -> ShotViews:
@@ -72,7 +80,9 @@ def open_views(shot: Shot, *, forward: Vector = (0.0, 0.0, 1.0), up: Vector = (0
         up=_turned(pose, up),
     )
     heights = (height, height * pose.scale)
-    return ShotViews(performance, retargeted, landmarks, float(sequence.fps or 30.0), heights)
+    motion = load_motion(shot)
+    motions = (motion, motion.seen_from(pose))
+    return ShotViews(performance, retargeted, landmarks, float(sequence.fps or 30.0), heights, motions)
 
 
 def expressive_frames(shot: Shot, count: int) -> list[int]:
@@ -91,6 +101,13 @@ def reader_of(sequence: FrameSequence) -> Callable[[int], NDArray[np.floating]]:
             return sequence.read(index, index + 1)[0]
 
     return frame
+
+
+def _held_still(view: View, motion: HeadMotion) -> View:
+    def frame(index: int) -> NDArray[np.floating]:
+        return np.asarray((view.frame(index) - motion.translations[index]) @ motion.rotations[index])
+
+    return replace(view, frame=frame)
 
 
 def _turned(pose: Similarity, direction: Vector) -> Vector:

@@ -31,13 +31,17 @@ class Chart:
 
 @dataclass(frozen=True)
 class Section:
-    """One stage of the work. ``numbers`` may nest; each known one is shown with how to judge it (``glossary``)."""
+    """One stage of the work. ``numbers`` may nest; each known one is shown with how to judge it (``glossary``).
+
+    ``notes`` are sentences, such as what the input checks found.
+    """
 
     title: str
     intro: str = ""
     figures: Sequence[Figure] = ()
     charts: Sequence[Chart] = ()
     numbers: Mapping[str, Any] = field(default_factory=dict)
+    notes: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

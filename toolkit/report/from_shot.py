@@ -49,15 +49,15 @@ def report_data(
         lambda: _transfer(shot, views, chosen),
         lambda: _details(shot),
         lambda: _timings(shot),
+        lambda: _parameters(shot),
     )
-    made: list[Section] = []
-    for step in steps:
+    made = _checks(shot)
+    for done, step in enumerate(steps, start=1):
         made.append(step())
-        progress("making the report", len(made), len(steps))
-    numbers = _numbers(shot, "inputs")
+        progress("making the report", done, len(steps))
     subtitle = f"{views.source.n_frames} frames at {views.fps:g} a second · {len(views.source.rest):,} vertices"
     return ReportData(
-        f"{views.target.label}: facial performance transfer", subtitle, _summary(shot, numbers), made, _links(shot)
+        f"{views.target.label}: facial performance transfer", subtitle, _summary(shot), made, _links(shot)
     )
 
 
@@ -140,21 +140,28 @@ def _numbers(shot: Shot, stage: str) -> Mapping[str, Any]:
     return numbers if isinstance(numbers, Mapping) else {}
 
 
-def _summary(shot: Shot, numbers: Mapping[str, Any]) -> dict[str, Any]:
+def _summary(shot: Shot) -> dict[str, Any]:
     config = shot.config
-    parameters = {
-        name: {key: value for table in m["parameters"].values() for key, value in table.items()}
-        for name in STAGES
-        if (m := shot.manifest(name)) and m.get("parameters") and name not in ("transfer", "result")
-    }
-    parameters["transfer"] = (shot.manifest("transfer") or {}).get("parameters", {}).get("transfer", {})
-    inputs = {
+    files = {
         "source": config.source.reference.name,
         "frames": config.source.frames.name,
         "target": config.target.reference.name,
     }
-    return {"files": inputs, **{k: v for k, v in numbers.items() if k != "findings"}, "parameters": parameters,
-            **{f"finding {k + 1}": text for k, text in enumerate(numbers.get("findings", []))}}  # fmt: skip
+    return {**files, **{key: value for key, value in _numbers(shot, "inputs").items() if key != "findings"}}
+
+
+def _checks(shot: Shot) -> list[Section]:
+    """What the checks found in the input, if anything."""
+    findings = [str(text) for text in _numbers(shot, "inputs").get("findings", [])]
+    intro = "What the checks found in the files; what could be repaired safely was repaired."
+    return [Section("Input checks", intro, notes=findings)] if findings else []
+
+
+def _parameters(shot: Shot) -> Section:
+    tables: dict[str, Any] = {}
+    for stage in STAGES:
+        tables |= (shot.manifest(stage) or {}).get("parameters", {})
+    return Section("Parameters", "As the stages last ran; change them in shot.toml.", numbers=tables)
 
 
 def _links(shot: Shot) -> list[tuple[str, str]]:

@@ -39,7 +39,7 @@ GLOSSARY: tuple[Entry, ...] = (
         share=True,
     ),
     Entry(
-        r"landmark.*(share|relative|percent)",
+        r"landmark.*(share|relative)",
         "How far landmarks ended from their partners, as a share of the face's height. One large value is "
         "usually one misplaced landmark.",
         good=0.01,
@@ -47,7 +47,7 @@ GLOSSARY: tuple[Entry, ...] = (
         share=True,
     ),
     Entry(
-        r"landmark",
+        r"landmark.*(error|mean|max|rms|median|worst|distance)",
         "How far landmarks ended from their partners. One large value is usually one misplaced landmark.",
     ),
     Entry(
@@ -76,7 +76,15 @@ GLOSSARY: tuple[Entry, ...] = (
         "Frame-to-frame trembling, measured by second differences. The result's should not exceed the source's.",
     ),
     Entry(
-        r"residual|error_rms|error_share",
+        r"error_share",
+        "What the bases leave out, as a share of the source's large motion. If an expression looks weak, ask for more "
+        "bases or a lower threshold.",
+        good=0.05,
+        poor=0.15,
+        share=True,
+    ),
+    Entry(
+        r"residual|error_rms",
         "What the bases leave out of the source's large motion. If an expression looks weak, ask for more "
         "bases or a lower threshold.",
     ),

@@ -12,7 +12,7 @@ from toolkit.rendering.colormap import ColorScale, add_legend
 from toolkit.rendering.fields import coating_fields, motion_field
 from toolkit.rendering.overlay import Lines
 from toolkit.rendering.renderer import Renderer
-from toolkit.rendering.sheet import Row
+from toolkit.rendering.sheet import Row, contact_sheet
 from toolkit.rendering.shots import ShotViews
 from toolkit.rendering.takes import View
 from toolkit.report.data import Figure
@@ -21,21 +21,23 @@ from toolkit.shot import Shot
 from toolkit.stages.decompose import source_decomposer
 from toolkit.stages.inputs import load_lines, load_mesh
 
-__all__ = ["map_rows", "shot_registration_figures"]
+__all__ = ["map_sheet", "shot_registration_figures"]
 
 _SIZE = (360, 450)
 _UNIT = "% of the face's height"
 
 
-def map_rows(name: str, shots: Sequence[Shot], opened: Sequence[ShotViews], frames: Sequence[int]) -> list[Row]:
-    """Rows of the map ``"motion"``, ``"coating"`` (source first, then every result) or ``"registration"``.
+def map_sheet(
+    name: str, shots: Sequence[Shot], opened: Sequence[ShotViews], frames: Sequence[int]
+) -> NDArray[np.uint8]:
+    """Sheet of the map ``"motion"``, ``"coating"`` (source first, then every result) or ``"registration"``.
 
     Values are in percent of each face's height, so that faces of different sizes can be compared.
     """
     views = [opened[0].source, *(each.target for each in opened)]
     heights = [opened[0].face_heights[0], *(each.face_heights[1] for each in opened)]
     if name == "registration":
-        return [_registration_row(shot, each) for shot, each in zip(shots, opened, strict=True)]
+        return contact_sheet([_registration_row(shot, each) for shot, each in zip(shots, opened, strict=True)])
     if name == "motion":
         fields = [[motion_field(view.rest, view.frame(t)) for t in frames] for view in views]
         cmap = "viridis"
@@ -47,7 +49,8 @@ def map_rows(name: str, shots: Sequence[Shot], opened: Sequence[ShotViews], fram
         raise InputError(f"no map is called {name!r}", remedy="use coating, registration or motion")
     shares = [100 * np.stack(row) / height for row, height in zip(fields, heights, strict=True)]
     scale = ColorScale.unsigned(np.stack(shares), name, _UNIT, cmap=cmap)
-    return [_painted_row(view, frames, share, scale) for view, share in zip(views, shares, strict=True)]
+    rows = [_painted_row(view, frames, share, scale) for view, share in zip(views, shares, strict=True)]
+    return add_legend(contact_sheet(rows, [f"frame {index}" for index in frames]), scale)
 
 
 def shot_registration_figures(shot: Shot, views: ShotViews) -> list[Figure]:
@@ -67,7 +70,7 @@ def shot_registration_figures(shot: Shot, views: ShotViews) -> list[Figure]:
 def _painted_row(view: View, frames: Sequence[int], fields: NDArray[np.float64], scale: ColorScale) -> Row:
     renderer, camera = Renderer(view.triangles), view.camera(_SIZE[0] / _SIZE[1])
     images = [
-        add_legend(renderer.render(view.frame(t), camera, _SIZE, colors=scale.colors(field)), scale)
+        renderer.render(view.frame(t), camera, _SIZE, colors=scale.colors(field))
         for t, field in zip(frames, fields, strict=True)
     ]
     return Row(view.label, images)
