@@ -32,7 +32,16 @@ def expression_weights() -> Array:
         for name, weight in event["shapes"].items():
             for shape in _both_sides(name):
                 weights[:, SHAPES.index(shape)] += weight * np.minimum(rise, fall)
-    return np.clip(weights, 0, 1)
+    return _lids_free_to_close(np.clip(weights, 0, 1))
+
+
+def _lids_free_to_close(weights: Array) -> Array:
+    """Let squinting and widening go while an eye blinks: shapes add, and the lids would cross or stay apart."""
+    for side in ("Left", "Right"):
+        blink = weights[:, SHAPES.index(f"eyeBlink{side}")]
+        for name in ("eyeSquint", "eyeWide"):
+            weights[:, SHAPES.index(name + side)] *= 1 - blink
+    return weights
 
 
 def event_peaks() -> dict[str, int]:
