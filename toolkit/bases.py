@@ -28,8 +28,8 @@ _CHUNK_COLUMNS = 16384
 class BasisParameters:
     """When to stop adding bases: whichever comes first.
 
-    ``threshold`` root mean square error as a share of the take's own RMS motion (0 keeps every frame that adds
-    something); ``threshold_length`` the same as a length in mesh units, if given; ``count`` the most bases, if given.
+    ``threshold`` root mean square error as a share of the take's own RMS motion (0 makes every moving frame a basis);
+    ``threshold_length`` the same as a length in mesh units, if given; ``count`` the most bases, if given.
     ``contact_share`` is how much the gaps of lids and lips count in the fit, beside the vertices.
     """
 
@@ -115,6 +115,13 @@ def select_bases(
         squared = _squared_errors(positions, np.array(frames), weights)
         errors.append(float(np.sqrt(squared.sum() * per_length)))
         progress("choosing bases", len(frames), limit)
+    if parameters.threshold == 0 and parameters.threshold_length is None and len(frames) < limit:
+        # What is left differs by less than the Gram matrix can tell; zero was asked for, so each is its own basis.
+        rest = np.flatnonzero(alive)[: limit - len(frames)]
+        frames += rest.tolist()
+        weights = np.column_stack([weights, np.zeros((len(gram), len(rest)))])
+        weights[frames] = np.eye(len(frames))
+        errors += [errors[-1]] * (len(rest) - 1) + [0.0] * bool(len(rest))
     chosen = np.array(frames, dtype=np.int64)
     frame_errors = np.sqrt(_squared_errors(positions, chosen, weights) / n_vertices)
     return BasisSelection(chosen, weights, np.array(errors), frame_errors)

@@ -139,5 +139,8 @@ class ContactMap:
 
     def __call__(self, source_gaps: Array) -> Array:
         """Gaps ``(..., P, 3)`` of the source -> gaps of the target."""
-        moved = np.einsum("pij,...pj->...pi", self.matrix, source_gaps - self.source_rest)
-        return np.asarray(self.target_rest + moved)
+        return np.asarray(self.target_rest + self.change(source_gaps - self.source_rest))
+
+    def change(self, source_change: Array) -> Array:
+        """Change of the gaps ``(..., P, 3)`` from rest on the source -> on the target."""
+        return np.asarray(np.einsum("pij,...pj->...pi", self.matrix, source_change))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.contacts import ContactPairs
+from toolkit.contacts import ContactMap, ContactPairs
 from toolkit.decomposition import Decomposer
 from toolkit.mesh.geometry import local_frames
 from toolkit.progress import Progress, silent
@@ -20,7 +20,7 @@ __all__ = ["LocalDetails", "transfer_bases"]
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 3
+_ROUNDS = 2
 
 
 class LocalDetails:
@@ -51,13 +51,14 @@ def transfer_bases(
     details: NDArray[np.floating],
     gain: Array,
     pairs: ContactPairs,
-    goals: Array,
+    contact_map: ContactMap,
+    source_gaps: Array,
     progress: Progress = silent,
 ) -> Array:
     """Transfer the smoothed source shapes ``(K, V, 3)``; returns the target's smoothed bases ``(K, V, 3)``.
 
-    ``details`` (K, V, 3) the source's motion details in the same frames, ``gain`` (V,) their factor, ``goals``
-    (K, P, 3) the gaps that the visible target should have.
+    ``details`` (K, V, 3) are the source's motion details in the same frames, ``gain`` (V,) their factor,
+    ``source_gaps`` (K, P, 3) the gaps of the visible source, ``contact_map`` what they become on the target.
     """
     right = system.right_hand_sides(shapes, progress)
     if not system.has_contacts or not len(shapes):
@@ -66,7 +67,11 @@ def transfer_bases(
     local = LocalDetails(target, ids)
     spread = np.zeros_like(target.rest.smooth)
     moved = np.asarray(details[:, ids], dtype=np.float64) * gain[ids, None]
-    bases = np.broadcast_to(target.rest.smooth, shapes.shape)
+    # Begin with the smoothed surfaces' own contacts; on the source itself that is the answer.
+    smooth_change = pairs.gaps(shapes) - pairs.gaps(system.source)
+    first_goals = pairs.gaps(system.target) + contact_map.change(smooth_change)
+    bases = system.solve_for(right + system.contact_forces(first_goals))
+    goals = contact_map(source_gaps)
     for _ in range(_ROUNDS):
         offsets = np.empty_like(goals)
         for k, basis in enumerate(bases):

@@ -87,7 +87,7 @@ def load_config(path: Path) -> ShotConfig:
     source = _inputs(data, "source", {"reference": str, "frames": str, "fps": float}, ["reference", "frames"], path)
     target = _inputs(data, "target", {"reference": str}, ["reference"], path)
     folder = path.parent
-    stages = {name: _table(kind, data.get(name, {}), name, path) for name, kind in _STAGES.items()}
+    stages: dict[str, Any] = {name: _table(kind, data.get(name, {}), name, path) for name, kind in _STAGES.items()}
     return ShotConfig(
         SourceInput(folder / source["reference"], folder / source["frames"], source.get("fps")),
         TargetInput(folder / target["reference"]),

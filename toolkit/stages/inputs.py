@@ -42,7 +42,7 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     config = shot.config
     source, target = read_mesh(config.source.reference), read_mesh(config.target.reference)
     sequence = open_sequence(config.source.frames, fps=config.source.fps)
-    landmarks = load_landmarks(shot.landmarks_path) if shot.landmarks_path.exists() else Landmarks.none()
+    landmarks = load_landmarks(shot.landmarks_path) if shot.landmarks_path.exists() else Landmarks.of([], [])
     same = same_topology(source, target)
     lines: list[FeatureLine] = []
     if shot.feature_lines_path.exists():
@@ -66,7 +66,7 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
             progress=progress,
         )
         source, target, lines = checked.source, checked.target, list(checked.lines)
-        landmarks = Landmarks(landmarks.names, landmarks.source, checked.target_ids)
+        landmarks = Landmarks(landmarks.source, checked.target_ids, landmarks.names)
         folder.numbers["findings"] = [f.sentence for f in checked.findings] + list(checked.notes)
     _save_mesh(folder, "source", source)
     _save_mesh(folder, "target", target)
@@ -121,7 +121,7 @@ def load_landmark_pairs(shot: Shot) -> Landmarks:
     """The landmarks, target ids being those of the repaired target."""
     names = json.loads((shot.stage_folder("inputs") / "landmark_names.json").read_text(encoding="utf-8"))
     pairs = np.array(shot.array("inputs", "landmarks"), dtype=np.int64).reshape(-1, 2)
-    return Landmarks(tuple(names), pairs[:, 0], pairs[:, 1])
+    return Landmarks.of(pairs[:, 0], pairs[:, 1], names)
 
 
 def _save_mesh(folder: StageFolder, side: str, mesh: TriangleMesh) -> None:

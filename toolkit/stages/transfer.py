@@ -43,9 +43,9 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     )
     progress("factorising", 1, 1)
     gain = detail_gain(shot.config.details, source.rest.smooth, target.rest.smooth, source.mesh.triangles)
-    gaps = np.array(shot.array("bases", "pair_gaps"))
-    goals = ContactMap(pairs, source.mesh.vertices, target.mesh.vertices)(gaps[1:][frames])
-    bases = transfer_bases(system, target, shapes, details[frames], gain, pairs, goals, progress)
+    gaps = np.array(shot.array("bases", "pair_gaps"))[1:][frames]
+    contact_map = ContactMap(pairs, source.mesh.vertices, target.mesh.vertices)
+    bases = transfer_bases(system, target, shapes, details[frames], gain, pairs, contact_map, gaps, progress)
     folder.save("bases", bases)
     folder.save("rest", target.rest.smooth)
     folder.save("gain", gain)
