@@ -5,7 +5,7 @@ import pytest
 
 from toolkit.errors import InputError
 from toolkit.rendering import Camera, Lighting, Lines, Markers, Renderer, kernels
-from toolkit.rendering.shading import encode_srgb, linear_rgb
+from toolkit.rendering.shading import encode_pixels, encode_srgb, linear_rgb
 
 SIZE = (200, 240)
 BLACK = Lighting(background_top=(0, 0, 0), background_bottom=(0, 0, 0))
@@ -165,3 +165,9 @@ def test_bad_input_is_named(sphere, camera):
         renderer.render(sphere[0], camera, shading="toon")
     with pytest.raises(InputError, match="triangles of shape"):
         Renderer(np.zeros((0, 3)))
+
+
+def test_colours_survive_the_way_to_linear_light_and_back():
+    every = np.arange(256, dtype=np.uint8)
+    assert np.array_equal(encode_pixels(linear_rgb(every)), every)
+    assert np.array_equal(encode_pixels(np.array([-1.0, 2.0])), [0, 255])

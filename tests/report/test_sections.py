@@ -49,7 +49,7 @@ def test_coating_pictures_are_four_and_the_smooth_one_differs(ball):
 
 
 def test_every_view_has_its_motion_and_every_basis_its_faces(ball):
-    assert len(motion_figures([ball, ball], 4, "cm")) == 2
+    assert len(motion_figures([ball, ball], 4, [2.0, 2.0])) == 2
     bases = np.stack([ball.frame(t) for t in range(1, 5)])
     figures = bases_figures([(ball, bases), (ball, bases)], np.arange(1, 5), limit=3, width=40)
     assert [figure.caption for figure in figures] == ["Basis 1: frame 1", "Basis 2: frame 2", "Basis 3: frame 3"]

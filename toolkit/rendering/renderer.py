@@ -13,7 +13,7 @@ from toolkit.rendering import kernels
 from toolkit.rendering.camera import Camera
 from toolkit.rendering.overlay import Lines, Markers, draw_overlays
 from toolkit.rendering.samples import Finish, KeyShadow, Surface, shade
-from toolkit.rendering.shading import CLAY, Lighting, Material, encode_srgb, linear_rgb
+from toolkit.rendering.shading import CLAY, Lighting, Material, encode_pixels, linear_rgb
 
 __all__ = ["Renderer"]
 
@@ -85,7 +85,7 @@ class Renderer:
             np.array([wireframe * supersample / 2, 0.01, 0.01, 0.012]),
             supersample,
         )
-        image = np.round(255 * encode_srgb(linear)).astype(np.uint8)
+        image = encode_pixels(linear)
         if overlays:
             image = draw_overlays(image, overlays, points, camera, nearness)
         return image

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["BONE", "CLAY", "SKIN", "Lighting", "Material", "encode_srgb", "linear_rgb"]
+__all__ = ["BONE", "CLAY", "SKIN", "Lighting", "Material", "encode_pixels", "encode_srgb", "linear_rgb"]
 
 Vector = tuple[float, float, float]
 
@@ -40,7 +41,7 @@ class Lighting:
     """
 
     key: Vector = (-0.62, 0.66, 0.42)
-    key_strength: float = 3.2
+    key_strength: float = 3.45
     fill: Vector = (0.85, 0.10, 0.55)
     fill_strength: float = 0.30
     rim: Vector = (0.80, 0.45, -0.55)
@@ -58,6 +59,16 @@ def linear_rgb(colors: ArrayLike) -> NDArray[np.float64]:
     unit = values.astype(np.float64) / (255.0 if values.dtype == np.uint8 else 1.0)
     unit = np.clip(unit, 0.0, 1.0)
     return np.where(unit <= 0.04045, unit / 12.92, ((unit + 0.055) / 1.055) ** 2.4)
+
+
+def encode_pixels(linear: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Encode linear light in 0..1 as sRGB bytes, same shape; by table, since the power is slow."""
+    return _byte_table()[(np.clip(linear, 0, 1) * 65535 + 0.5).astype(np.uint16)]
+
+
+@lru_cache(maxsize=1)
+def _byte_table() -> NDArray[np.uint8]:
+    return np.round(255 * encode_srgb(np.arange(65536) / 65535)).astype(np.uint8)
 
 
 def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]:

@@ -113,7 +113,9 @@ def _transfer(shot: Shot, views: ShotViews, chosen: list[int]) -> Section:
             numbers[f"largest gap of {name}, % of width, where the source is closed"] = float(
                 curves["result"][closed].max()
             )
-    return sections.transfer_section(motion_figures([views.source, views.target], strongest, _UNIT), gaps, numbers)
+    return sections.transfer_section(
+        motion_figures([views.source, views.target], strongest, views.face_heights), gaps, numbers
+    )
 
 
 def _gaps(shot: Shot, views: ShotViews, pairs: ContactPairs, names: list[str]) -> dict[str, dict[str, np.ndarray]]:

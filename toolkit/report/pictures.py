@@ -81,12 +81,17 @@ def coating_figures(
     ]
 
 
-def motion_figures(views: Sequence[View], frame: int, unit: str, *, only: Ids | None = None) -> list[Figure]:
-    """How far every vertex moved in one frame, head motion apart, each view on a scale of its own."""
+def motion_figures(
+    views: Sequence[View], frame: int, heights: Sequence[float], *, only: Ids | None = None
+) -> list[Figure]:
+    """How far every vertex moved in one frame, head motion apart, in percent of the face's height, on one scale."""
+    fields = [
+        100 * motion_field(np.asarray(view.rest, dtype=np.float64), view.frame(frame)) / height
+        for view, height in zip(views, heights, strict=True)
+    ]
+    scale = ColorScale.unsigned(np.stack(fields), "motion", "% of the face's height")
     figures = []
-    for view in views:
-        field = motion_field(np.asarray(view.rest, dtype=np.float64), view.frame(frame))
-        scale = ColorScale.unsigned(field, "motion", unit)
+    for view, field in zip(views, fields, strict=True):
         camera = view.camera(_SIZE[0] / _SIZE[1], only=only)
         image = Renderer(view.triangles).render(view.frame(frame), camera, _SIZE, colors=scale.colors(field))
         figures.append(Figure(add_legend(image, scale), f"{view.label}: motion in frame {frame}."))
