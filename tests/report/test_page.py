@@ -11,7 +11,7 @@ from PIL import Image
 
 from toolkit.report import Chart, Figure, ReportData, Section, build, line_chart
 
-_VOID = {"meta", "img", "br", "link", "hr", "input"}
+_VOID = {"col", "meta", "img", "br", "link", "hr", "input"}
 
 
 class _Outline(HTMLParser):

@@ -86,10 +86,15 @@ def open_views(shot: Shot, *, forward: Vector = (0.0, 0.0, 1.0), up: Vector = (0
 
 
 def expressive_frames(shot: Shot, count: int) -> list[int]:
-    """Choose ``count`` frames of the take that differ most in shape, the calmest first among them."""
+    """Choose ``count`` frames of the take that differ most in shape, the calmest among them.
+
+    Displacements are divided by the square root of their size: else an open jaw outweighs every blink and frown.
+    """
     deltas = shot.array("decompose", "smooth_deltas")
     shapes = np.array(deltas[:, :: max(1, deltas.shape[1] // 500)]).reshape(len(deltas), -1)
-    return choose_frames(shapes, count, first=int(np.argmin(np.linalg.norm(shapes, axis=1))))
+    size = np.linalg.norm(shapes, axis=1, keepdims=True)
+    evened = shapes / np.sqrt(np.maximum(size, 1e-3 * float(size.max(initial=1e-30))))
+    return choose_frames(evened, count, first=int(np.argmin(size)))
 
 
 def reader_of(sequence: FrameSequence) -> Callable[[int], NDArray[np.floating]]:

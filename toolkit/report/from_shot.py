@@ -145,9 +145,9 @@ def _numbers(shot: Shot, stage: str) -> Mapping[str, Any]:
 def _summary(shot: Shot) -> dict[str, Any]:
     config = shot.config
     files = {
-        "source": config.source.reference.name,
-        "frames": config.source.frames.name,
-        "target": config.target.reference.name,
+        "source mesh": config.source.reference.name,
+        "take": config.source.frames.name,
+        "target mesh": config.target.reference.name,
     }
     return {**files, **{key: value for key, value in _numbers(shot, "inputs").items() if key != "findings"}}
 

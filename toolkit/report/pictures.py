@@ -99,7 +99,7 @@ def motion_figures(
 
 
 def bases_figures(
-    shapes: Sequence[tuple[View, Array]], frames: Ids, *, only: Ids | None = None, width: int = 240, limit: int = 12
+    shapes: Sequence[tuple[View, Array]], frames: Ids, *, only: Ids | None = None, width: int = 240, limit: int = 21
 ) -> list[Figure]:
     """Thumbnails of the first ``limit`` bases: each picture has one face a view, source above target.
 
