@@ -120,7 +120,7 @@ def parser() -> argparse.ArgumentParser:
     """The options."""
     made = parser_for(__doc__, shot=False)
     made.add_argument("shots", metavar="DIR", nargs="+", type=Path, help="shot folders")
-    made.add_argument("--count", type=int, default=6, metavar="N", help="frames on the sheets, chosen to differ (6)")
+    made.add_argument("--count", type=int, default=7, metavar="N", help="frames on the sheets, chosen to differ (7)")
     made.add_argument("--frames", type=numbers_list, metavar="A,B,...", help="or exactly these frames")
     made.add_argument(
         "--close-up", action="append", default=[], choices=["eyes", "mouth", "forehead"], help="repeatable"

@@ -33,7 +33,7 @@ def parser() -> argparse.ArgumentParser:
     """The options."""
     made = parser_for(__doc__)
     add_axes(made)
-    made.add_argument("--count", type=int, default=6, metavar="N", help="frames on the contact sheet (6)")
+    made.add_argument("--count", type=int, default=7, metavar="N", help="frames on the contact sheet (7)")
     made.add_argument("--out", metavar="FILE", help="where to write it (DIR/report.html)")
     return made
 

@@ -6,11 +6,13 @@ import logging
 from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.errors import InputError, MissingDependencyError
+from toolkit.meshio.aside import written_aside
 
 __all__ = ["write_video"]
 
@@ -29,36 +31,36 @@ def write_video(path: Path | str, images: Iterable[NDArray[np.uint8]], fps: floa
 
     if not fps > 0 or not np.isfinite(fps):
         raise InputError(f"a video cannot have {fps} frames a second", remedy="give a positive --fps")
-    codec = _available_codec()
-    target = Path(path)
-    aside = target.with_name(f".{target.stem}.partial{target.suffix or '.mp4'}")
-    count = 0
-    try:
-        with av.open(str(aside), "w", format="mp4", options={"movflags": "+faststart"}) as container:
-            stream = None
-            for image in images:
-                height, width = (n - n % 2 for n in image.shape[:2])
-                if stream is None:
-                    stream = container.add_stream(codec, rate=Fraction(fps).limit_denominator(1001))
-                    stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
-                    stream.options = {"crf": str(quality), "preset": "fast"} if codec == "libx264" else {}
-                    if codec != "libx264":
-                        stream.bit_rate = 8_000_000
-                elif (width, height) != (stream.width, stream.height):
-                    raise InputError(
-                        f"picture {count} is {width} x {height}, the first is {stream.width} x {stream.height}",
-                        where=target,
-                    )
-                frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image[:height, :width]), format="rgb24")
-                container.mux(stream.encode(frame))
-                count += 1
+    options = {"movflags": "+faststart"}
+    with written_aside(path) as temporary, av.open(str(temporary), "w", format="mp4", options=options) as container:
+        stream, count = None, 0
+        for count, image in enumerate(images, start=1):
+            height, width = (n - n % 2 for n in image.shape[:2])
             if stream is None:
-                raise InputError("there are no pictures to make a video of", where=target)
-            container.mux(stream.encode())
-        aside.replace(target)
-    finally:
-        aside.unlink(missing_ok=True)
+                stream = _add_stream(container, (width, height), fps, quality)
+            elif (width, height) != (stream.width, stream.height):
+                raise InputError(
+                    f"picture {count - 1} is {width} x {height}, the first is {stream.width} x {stream.height}",
+                    where=path,
+                )
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image[:height, :width]), format="rgb24")
+            container.mux(stream.encode(frame))
+        if stream is None:
+            raise InputError("there are no pictures to make a video of", where=path)
+        container.mux(stream.encode())
     return count
+
+
+def _add_stream(container: Any, size: tuple[int, int], fps: float, quality: int) -> Any:
+    codec = _available_codec()
+    stream = container.add_stream(codec, rate=Fraction(fps).limit_denominator(1001))
+    stream.width, stream.height = size
+    stream.pix_fmt = "yuv420p"
+    if codec == "libx264":
+        stream.options = {"crf": str(quality), "preset": "fast"}
+    else:
+        stream.bit_rate = 8_000_000
+    return stream
 
 
 def _available_codec() -> str:

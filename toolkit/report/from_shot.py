@@ -35,7 +35,7 @@ def report_data(
     *,
     forward: Vector = (0.0, 0.0, 1.0),
     up: Vector = (0.0, 1.0, 0.0),
-    frames: int = 6,
+    frames: int = 7,
     progress: Progress = silent,
 ) -> ReportData:
     """Render and measure what the report shows; the stages must have been run."""
