@@ -68,9 +68,7 @@ def umeyama(
     covariance = (w[:, None] * dy).T @ dx
     left, singular, right = np.linalg.svd(covariance)
     if singular[1] <= 1e-12 * max(singular[0], np.finfo(float).tiny):
-        raise InputError(
-            "the corresponding points lie on one line, so they fix no rotation", remedy="spread them out"
-        )
+        raise InputError("the corresponding points lie on one line, so they fix no rotation", remedy="spread them out")
     signs = np.array([1.0, 1.0, 1.0 if np.linalg.det(left @ right) >= 0 else -1.0])
     rotation = (left * signs) @ right
     factor = float(singular @ signs / (w @ np.sum(dx * dx, axis=1))) if scale else 1.0
