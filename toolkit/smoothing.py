@@ -106,6 +106,9 @@ class SmoothingFilter:
         self._weights = renumbered.data.astype(np.float64)
         self._weights32 = self._weights.astype(np.float32)
         self.coefficients = filter_coefficients(parameters.steps, parameters.lambda_, parameters.mu)
+        # Terms below single precision's rounding are passes for nothing.
+        tail = np.cumsum(np.abs(self.coefficients[::-1]))[::-1]
+        self._coefficients32 = self.coefficients[: max(1, int(np.count_nonzero(tail > 3e-8)))]
 
     def smooth(self, values: NDArray[np.floating]) -> NDArray[np.floating]:
         """``M values`` for an array ``(V, C)`` in the original numbering, in the precision that it has."""
@@ -118,20 +121,22 @@ class SmoothingFilter:
 
         Rounding is that of the block's type: give small deltas, not positions, where float32 is used.
         """
-        weights = self._weights32 if block.dtype == np.float32 else self._weights
+        single = block.dtype == np.float32
+        weights = self._weights32 if single else self._weights
+        coefficients = self._coefficients32 if single else self.coefficients
         kind = block.dtype.type
         flat = block.reshape(len(block), -1)
         current = flat.copy()
-        result = flat * kind(self.coefficients[0])
+        result = flat * kind(coefficients[0])
         previous = np.empty_like(current)
-        for degree in range(1, len(self.coefficients)):
+        for degree in range(1, len(coefficients)):
             average_step(
                 self._indptr,
                 self._indices,
                 weights,
                 current,
                 previous,
-                kind(self.coefficients[degree]),
+                kind(coefficients[degree]),
                 result,
                 degree == 1,
             )
