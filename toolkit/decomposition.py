@@ -143,19 +143,21 @@ def decompose_sequence(
 def frame_neighbours(vertices: Array, triangles: NDArray[np.integer]) -> NDArray[np.int64]:
     """For each vertex the neighbour that its local frame's tangent points to, ``(V,)``.
 
-    The one whose edge is longest in the tangent plane, in units of the vertex's longest: the direction then depends
-    least on noise. A vertex without neighbours points to itself.
+    The one whose edge is longest in the tangent plane: the direction then depends least on noise. A vertex without
+    neighbours points to itself.
     """
     normals = vertex_normals(vertices, triangles)
     edges = unique_edges(triangles)
+    vector = vertices[edges[:, 1]] - vertices[edges[:, 0]]
+    squared = np.sum(vector**2, axis=1)
     start, end = np.concatenate([edges, edges[:, ::-1]]).T
-    vector = vertices[end] - vertices[start]
-    along = np.sum(vector * normals[start], axis=1)
-    length = np.sqrt(np.maximum(np.sum(vector**2, axis=1) - along**2, 0))
-    best_last = np.lexsort((-end, length, start))
-    last = np.flatnonzero(np.append(np.diff(start[best_last]) != 0, True))
+    along = np.concatenate([np.einsum("ei,ei->e", vector, normals[edges[:, k]]) for k in (0, 1)])
+    in_plane = np.tile(squared, 2) - along**2
+    longest = np.full(len(vertices), -np.inf)
+    np.maximum.at(longest, start, in_plane)
+    winners = np.flatnonzero(in_plane == longest[start])[::-1]
     neighbour = np.arange(len(vertices))
-    neighbour[start[best_last[last]]] = end[best_last[last]]
+    neighbour[start[winners]] = end[winners]  # of equal ones the first stays, being written last
     return neighbour
 
 

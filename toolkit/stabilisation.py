@@ -19,7 +19,7 @@ __all__ = ["HeadMotion", "fit_head_motion", "rigid_fits", "stable_weights"]
 
 Array = NDArray[np.float64]
 
-_SAMPLE = 4000
+_SAMPLE = 2000
 _ROUNDS = 12
 _STABLE_SHARE = 0.2
 
@@ -75,8 +75,9 @@ def stable_weights(rest: Array, points: Array) -> Array:
     smallest = 1e-9 * float(np.linalg.norm(np.ptp(rest, axis=0)))
     for _ in range(_ROUNDS):
         motion = rigid_fits(rest, points, weights)
-        fitted = np.einsum("tij,nj->tni", motion.rotations, rest) + motion.translations[:, None]
-        residual = np.sqrt(np.mean(np.sum((points - fitted) ** 2, axis=2), axis=0))
+        fitted = rest @ motion.rotations.transpose(0, 2, 1) + motion.translations[:, None]
+        fitted -= points
+        residual = np.sqrt(np.einsum("tni,tni->n", fitted, fitted) / len(points))
         sigma = max(float(np.quantile(residual, _STABLE_SHARE)), smallest)
         weights = 1 / (1 + (residual / sigma) ** 2) ** 2
     return weights
@@ -86,9 +87,9 @@ def rigid_fits(rest: Array, points: Array, weights: Array) -> HeadMotion:
     """Weighted Kabsch for every frame at once: ``argmin sum_v w_v |R_t rest_v + t_t - points_tv|^2``."""
     share = weights / weights.sum()
     rest_mean = share @ rest
-    means = np.einsum("n,tni->ti", share, points)
-    centred = (rest - rest_mean) * share[:, None]
-    covariance = np.einsum("tni,nj->tij", points, centred) - np.einsum("ti,j->tij", means, centred.sum(axis=0))
+    means = share @ points
+    # The weighted rest points sum to zero, so the frames need no centring.
+    covariance = points.transpose(0, 2, 1) @ ((rest - rest_mean) * share[:, None])
     u, _, vt = np.linalg.svd(covariance)
     sign = np.linalg.det(u @ vt)
     u[:, :, 2] *= sign[:, None]

@@ -16,9 +16,11 @@ __all__ = ["load_motion", "source_decomposer", "work"]
 def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     """Stabilise and split every frame."""
     sequence = load_sequence(shot)
-    decomposer = source_decomposer(shot)
+    decomposer = source_decomposer(shot, again=False)
     enabled = shot.config.stabilise.enabled
     motion = fit_head_motion(sequence, decomposer.mesh.vertices, enabled=enabled, progress=progress)
+    folder.save("rest_smooth", decomposer.rest.smooth)
+    folder.save("neighbour", decomposer.rest.neighbour)
     folder.save("rotations", motion.rotations)
     folder.save("translations", motion.translations)
     shape = (sequence.n_frames, sequence.n_vertices, 3)
@@ -33,9 +35,10 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     }
 
 
-def source_decomposer(shot: Shot) -> Decomposer:
-    """The source's smoothing and local frames, as the stage used them."""
-    return Decomposer(load_mesh(shot, "source"), shot.config.smoothing)
+def source_decomposer(shot: Shot, *, again: bool = True) -> Decomposer:
+    """The source's smoothing and local frames, as the stage uses them."""
+    neighbour = np.array(shot.array("decompose", "neighbour")) if again else None
+    return Decomposer(load_mesh(shot, "source"), shot.config.smoothing, neighbour)
 
 
 def load_motion(shot: Shot) -> HeadMotion:

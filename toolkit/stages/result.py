@@ -27,13 +27,12 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
 
 def open_reconstruction(shot: Shot) -> Reconstruction:
     """What builds any frame of the result on demand."""
-    source = source_decomposer(shot)
-    target = target_decomposer(shot, source)
+    target = target_decomposer(shot)
     gain = np.array(shot.array("transfer", "gain"))
     coating = None
     if shot.config.details.method == "coating":
         deltas, details = shot.array("decompose", "smooth_deltas"), shot.array("decompose", "details")
-        coating = CoatingDetails(source, target, deltas, details, gain, shot.config.details.screening)
+        coating = CoatingDetails(source_decomposer(shot), target, deltas, details, gain, shot.config.details.screening)
     return Reconstruction(
         target,
         np.array(shot.array("transfer", "bases")),

@@ -12,8 +12,7 @@ from toolkit.large_scale import transfer_bases
 from toolkit.progress import Progress
 from toolkit.shot import Shot, StageFolder
 from toolkit.stages.bases import load_pairs
-from toolkit.stages.decompose import source_decomposer
-from toolkit.stages.inputs import load_lines
+from toolkit.stages.inputs import load_lines, load_mesh
 from toolkit.stages.register import load_target
 from toolkit.transfer import DeformationTransfer
 
@@ -22,29 +21,28 @@ __all__ = ["target_decomposer", "work"]
 
 def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     """Factorise once, solve for all bases."""
-    source = source_decomposer(shot)
-    target = target_decomposer(shot, source)
+    source = load_mesh(shot, "source")
+    smooth = np.array(shot.array("decompose", "rest_smooth"))
+    target = target_decomposer(shot)
     pairs = load_pairs(shot)
     frames = np.array(shot.array("bases", "frames"))
     deltas, details = shot.array("decompose", "smooth_deltas"), shot.array("decompose", "details")
-    shapes = (
-        np.stack([source.rest.smooth + deltas[t] for t in frames]) if len(frames) else np.zeros((0, *deltas.shape[1:]))
-    )
+    shapes = smooth + deltas[frames]
     motion = _motion(deltas)
     progress("factorising", 0, 1)
     system = DeformationTransfer(
-        source.rest.smooth,
+        smooth,
         target.rest.smooth,
-        source.mesh.triangles,
+        source.triangles,
         motion,
         line_edges(load_lines(shot)),
         pairs,
         shot.config.transfer,
     )
     progress("factorising", 1, 1)
-    gain = detail_gain(shot.config.details, source.rest.smooth, target.rest.smooth, source.mesh.triangles)
+    gain = detail_gain(shot.config.details, smooth, target.rest.smooth, source.triangles)
     gaps = np.array(shot.array("bases", "pair_gaps"))[1:][frames]
-    contact_map = ContactMap(pairs, source.mesh.vertices, target.mesh.vertices)
+    contact_map = ContactMap(pairs, source.vertices, target.mesh.vertices)
     bases = transfer_bases(system, target, shapes, details[frames], gain, pairs, contact_map, gaps, progress)
     folder.save("bases", bases)
     folder.save("rest", target.rest.smooth)
@@ -57,9 +55,10 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     }
 
 
-def target_decomposer(shot: Shot, source: Decomposer) -> Decomposer:
-    """The target's smoothing and local frames, on the source's frame neighbours."""
-    return Decomposer(load_target(shot), shot.config.smoothing.resolved(source.mesh), source.rest.neighbour)
+def target_decomposer(shot: Shot) -> Decomposer:
+    """The target's smoothing and local frames, with the source's strength and frame neighbours."""
+    strength = shot.config.smoothing.resolved(load_mesh(shot, "source"))
+    return Decomposer(load_target(shot), strength, np.array(shot.array("decompose", "neighbour")))
 
 
 def _motion(deltas: np.ndarray) -> np.ndarray:
