@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,37 +20,54 @@ Ids = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Landmarks:
-    """N pairs: ``names``, ``source`` (N,) and ``target`` (N,) vertex ids, counted from 0."""
+    """N pairs: ``source`` (N,) and ``target`` (N,) vertex ids, counted from 0, and ``names``."""
 
-    names: tuple[str, ...]
     source: Ids
     target: Ids
+    names: tuple[str, ...]
 
-    def __len__(self) -> int:
-        return len(self.names)
+    @classmethod
+    def of(
+        cls,
+        source: Sequence[int] | NDArray[np.integer],
+        target: Sequence[int] | NDArray[np.integer],
+        names: Sequence[str] = (),
+    ) -> Landmarks:
+        """Make pairs of vertex ids; names are made up where none are given."""
+        given = tuple(names) or tuple(f"landmark {i}" for i in range(len(source)))
+        if not len(source) == len(target) == len(given):
+            counts = f"{len(source)} source ids, {len(target)} target ids and {len(given)} names"
+            raise InputError(f"{counts} do not pair up", where="landmarks", remedy="give one of each for every pair")
+        return cls(np.asarray(source, dtype=np.int64), np.asarray(target, dtype=np.int64), given)
 
     @classmethod
     def none(cls) -> Landmarks:
         """No pairs."""
-        return cls((), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+        return cls(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), ())
+
+    def __len__(self) -> int:
+        return len(self.names)
 
 
 def load_landmarks(path: str | Path) -> Landmarks:
-    """Read ``{"pairs": [{"name", "source", "target"}, ...]}``."""
+    """Read ``{"pairs": [{"name", "source", "target"}, ...]}``; a missing name is made up.
+
+    Raises
+    ------
+    InputError : no such file, not of this form, or an id that is no whole number; with the file and the pair's index
+    """
     try:
         pairs = json.loads(Path(path).read_text(encoding="utf-8"))["pairs"]
-        names = tuple(str(pair["name"]) for pair in pairs)
-        source = np.array([_vertex(pair["source"]) for pair in pairs], dtype=np.int64)
-        target = np.array([_vertex(pair["target"]) for pair in pairs], dtype=np.int64)
+        rows = [_pair(pair, index) for index, pair in enumerate(pairs)]
     except FileNotFoundError:
         raise InputError("there is no such file", where=path, remedy="give the path of a landmarks.json") from None
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
-            f"this is no landmark file ({error!r})",
+            f"this is no landmark file ({error})",
             where=path,
             remedy='it should read {"pairs": [{"name": "nose_tip", "source": 17, "target": 402}]}',
         ) from error
-    return Landmarks(names, source, target)
+    return Landmarks.of([row[1] for row in rows], [row[2] for row in rows], [row[0] for row in rows])
 
 
 def save_landmarks(path: str | Path, landmarks: Landmarks) -> None:
@@ -62,7 +80,13 @@ def save_landmarks(path: str | Path, landmarks: Landmarks) -> None:
         temporary.write_text(json.dumps({"pairs": pairs}, indent=1) + "\n", encoding="utf-8")
 
 
-def _vertex(value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise TypeError(f"{value!r} is no vertex id")
-    return value
+def _pair(pair: dict[str, object], index: int) -> tuple[str, int, int]:
+    if not isinstance(pair, dict):
+        raise TypeError(f"pair {index} is {pair!r}")
+    ids = []
+    for key in ("source", "target"):
+        value = pair.get(key)
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise TypeError(f"pair {index}: {key} is {value!r}, no vertex id")
+        ids.append(value)
+    return str(pair.get("name") or f"pair {index}"), ids[0], ids[1]

@@ -1,0 +1,93 @@
+"""A decimated copy of a mesh on which the heavy solves run, and the way back up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from toolkit.mesh import TriangleMesh
+
+__all__ = ["Coarse", "decimate"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Coarse:
+    """``mesh`` of C vertices, and ``prolong`` (V, C) sparse, rows summing to one: fine ~ prolong @ coarse."""
+
+    mesh: TriangleMesh
+    prolong: sp.csr_matrix
+
+
+def decimate(mesh: TriangleMesh, n_vertices: int) -> Coarse:
+    """Quadric decimation to about ``n_vertices``, with the barycentric place of every fine vertex on the result.
+
+    A fine vertex is looked for only on the coarse triangles round the vertex into which it collapsed, so the lips'
+    two sheets never mix, however near they are. A mesh that is small enough is returned as it is.
+    """
+    if mesh.n_vertices <= n_vertices:
+        return Coarse(mesh, sp.identity(mesh.n_vertices, format="csr"))
+    import fast_simplification
+
+    keep = min(0.999, n_vertices / mesh.n_vertices)
+    _, _, collapses = fast_simplification.simplify(
+        mesh.vertices, mesh.triangles, target_reduction=1.0 - keep, return_collapses=True
+    )
+    vertices, triangles, landed = fast_simplification.replay_simplification(mesh.vertices, mesh.triangles, collapses)
+    coarse = TriangleMesh(np.asarray(vertices, dtype=np.float64), np.asarray(triangles, dtype=np.int32))
+    return Coarse(coarse, _barycentric_rows(mesh.vertices, coarse, np.asarray(landed, dtype=np.int64)))
+
+
+def _barycentric_rows(points: Array, coarse: TriangleMesh, landed: NDArray[np.int64]) -> sp.csr_matrix:
+    """For each fine point the nearest point among the triangles within two edges of ``landed`` (V,)."""
+    n, corners = coarse.n_vertices, coarse.triangles
+    n_triangles = coarse.n_triangles
+    incidence = sp.csr_matrix(
+        (np.ones(3 * n_triangles, dtype=np.int8), (corners.ravel(), np.repeat(np.arange(n_triangles), 3))),
+        shape=(n, n_triangles),
+    )
+    near = ((incidence @ incidence.T).astype(bool).astype(np.int8) @ incidence).tocsr()
+    best = np.full(len(points), np.inf)
+    triangle, weights = np.zeros(len(points), dtype=np.int64), np.tile([1.0, 0.0, 0.0], (len(points), 1))
+    counts = np.diff(near.indptr)[landed]
+    for k in range(int(counts.max(initial=0))):
+        rows = np.flatnonzero(counts > k)
+        candidate = near.indices[near.indptr[landed[rows]] + k]
+        bary, squared = _closest_on_triangles(points[rows], coarse.vertices[corners[candidate]])
+        better = squared < best[rows]
+        chosen = rows[better]
+        best[chosen], triangle[chosen], weights[chosen] = squared[better], candidate[better], bary[better]
+    columns = np.where(np.isfinite(best)[:, None], corners[triangle], landed[:, None])
+    rows = np.repeat(np.arange(len(points)), 3)
+    return sp.csr_matrix((weights.ravel(), (rows, columns.ravel())), shape=(len(points), n))
+
+
+def _closest_on_triangles(p: Array, triangles: Array) -> tuple[Array, Array]:
+    """Barycentrics ``(N, 3)`` and squared distance ``(N,)`` of the closest point of one triangle each ``(N, 3, 3)``.
+
+    Inside the triangle the plane's projection; otherwise the best of the three edges.
+    """
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    u, v, w = b - a, c - a, p - a
+    uu, uv, vv = (np.einsum("nd,nd->n", *pair) for pair in ((u, u), (u, v), (v, v)))
+    wu, wv = np.einsum("nd,nd->n", w, u), np.einsum("nd,nd->n", w, v)
+    area = np.maximum(uu * vv - uv * uv, 1e-300)
+    s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
+    bary = np.stack([1 - s - t, s, t], axis=1)
+    outside = np.any(bary < 0, axis=1)
+    squared = np.sum((p - np.einsum("nk,nkd->nd", bary, triangles)) ** 2, axis=1)
+    squared[outside] = np.inf
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        start, along = triangles[:, i], triangles[:, j] - triangles[:, i]
+        length = np.maximum(np.einsum("nd,nd->n", along, along), 1e-300)
+        at = np.clip(np.einsum("nd,nd->n", p - start, along) / length, 0, 1)
+        gap = np.sum((p - start - at[:, None] * along) ** 2, axis=1)
+        better = outside & (gap < squared)
+        squared[better] = gap[better]
+        bary[better] = 0.0
+        bary[better, i], bary[better, j] = 1 - at[better], at[better]
+    return bary, squared

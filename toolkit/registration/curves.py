@@ -1,0 +1,165 @@
+"""Feature lines that both faces have, as pairs of curves corner to corner, and the sheets that they part."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import dijkstra
+
+from toolkit.feature_lines import FeatureLine, find_openings, shortest_edge_path, trace_lines
+from toolkit.mesh import TriangleMesh, unique_edges
+
+__all__ = ["Curve", "closest_on_polyline", "match_lines", "opposite_sheets", "rim_loops", "sheet_labels"]
+
+Array = NDArray[np.float64]
+Ids = NDArray[np.int64]
+
+_STEADY = 1.5
+"""A vertex belongs to a sheet when the other sheet's rim is this much farther along the surface."""
+_REACH = 0.5
+"""How far a sheet reaches from its rim, in widths of the opening."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line on the source, ``vertices`` (n,), and where it lies on the target, ``points`` (m, 3) in order.
+
+    ``path`` (m,) are the target's vertices under the points; the points are faired, so that a path that zigzags
+    along edges does not make the source's line zigzag. ``opening`` names the opening whose side it is, and ``side``
+    is +1 (upper) or -1; 0 if it is not the rim of an opening.
+    """
+
+    name: str
+    vertices: Ids
+    points: Array
+    path: Ids
+    opening: str
+    side: int
+
+
+def match_lines(lines: Sequence[FeatureLine], source: TriangleMesh, target: TriangleMesh, posed: Array) -> list[Curve]:
+    """Pair the lines that carry both sides.
+
+    ``posed`` (V, 3) is the source where the landmarks' spline puts it, which tells where on a closed target line the
+    corners are and which way round it runs. Closed lines whose vertices open ones cover are left out; other closed
+    ones are split at their corners, the two vertices farthest apart.
+    """
+    both = trace_lines([line for line in lines if line.target_vertices is not None], source.vertices, source.triangles)
+    rims = {frozenset(o.upper.tolist()): (o.name, 1) for o in find_openings(both, source.vertices)}
+    rims |= {frozenset(o.lower.tolist()): (o.name, -1) for o in find_openings(both, source.vertices)}
+    covered = {int(v) for line in both if not line.closed for v in line.vertices}
+    curves = []
+    for line in both:
+        if line.target_vertices is None:
+            continue
+        path = shortest_edge_path(target.vertices, target.triangles, line.target_vertices, line.closed)
+        if not line.closed:
+            pieces = [(line.vertices, _along(path, posed[line.vertices], target.vertices))]
+        elif len(covered.intersection(line.vertices.tolist())) > 2:
+            continue
+        else:
+            pieces = _split(line.vertices, path, posed, target.vertices)
+        for k, (ids, over) in enumerate(pieces):
+            opening, side = rims.get(frozenset(ids.tolist()), ("", 0))
+            name = line.name if len(pieces) == 1 else f"{line.name} {k + 1}"
+            curves.append(Curve(name, ids, _faired(target.vertices[over]), over, opening, side))
+    return curves
+
+
+def rim_loops(
+    lines: Sequence[FeatureLine], source: TriangleMesh, curves: Sequence[Curve]
+) -> tuple[list[Ids], list[Ids]]:
+    """Vertices of the rims of all openings: rings on the source, and on the target where it has the line too.
+
+    The source's need no partner on the target: what lies behind them is interior all the same.
+    """
+    traced = trace_lines(lines, source.vertices, source.triangles)
+    on_source = [np.concatenate([o.upper, o.lower]) for o in find_openings(traced, source.vertices)]
+    names = {c.opening for c in curves if c.opening}
+    on_target = [np.concatenate([c.path for c in curves if c.opening == name]) for name in sorted(names)]
+    return on_source, on_target
+
+
+def closest_on_polyline(points: Array, polyline: Array) -> Array:
+    """Closest points ``(N, 3)`` on a polyline ``(m, 3)`` to ``points`` (N, 3)."""
+    start, along = polyline[:-1], np.diff(polyline, axis=0)
+    length = np.maximum(np.sum(along**2, axis=1), 1e-300)
+    at = np.clip(np.einsum("nmd,md->nm", points[:, None] - start[None], along) / length, 0, 1)
+    candidates = start[None] + at[..., None] * along
+    nearest = np.argmin(np.sum((candidates - points[:, None]) ** 2, axis=2), axis=1)
+    return candidates[np.arange(len(points)), nearest]
+
+
+def sheet_labels(
+    mesh: TriangleMesh, skin: NDArray[np.bool_], curves: Sequence[Curve], on_target: bool
+) -> dict[str, NDArray[np.int8]]:
+    """For each opening with both sides, ``(V,)`` +1 on the upper sheet, -1 on the lower, 0 where it is not clear.
+
+    Nearness is along the skin: lips that touch are far apart, and beyond the corners both rims are equally far.
+    """
+    edges = unique_edges(mesh.triangles)
+    edges = edges[skin[edges].all(axis=1)]
+    lengths = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
+    graph = sp.csr_matrix((np.maximum(lengths, 1e-300), (edges[:, 0], edges[:, 1])), shape=(len(skin), len(skin)))
+    labels = {}
+    for name in sorted({c.opening for c in curves if c.opening}):
+        sides = {c.side: (c.path if on_target else c.vertices) for c in curves if c.opening == name}
+        if set(sides) != {1, -1}:
+            continue
+        width = float(np.linalg.norm(mesh.vertices[sides[1][0]] - mesh.vertices[sides[1][-1]]))
+        limit = _REACH * width * _STEADY
+        upper, lower = (
+            dijkstra(graph, directed=False, indices=sides[k][1:-1], limit=limit, min_only=True) for k in (1, -1)
+        )
+        near = np.minimum(upper, lower) < _REACH * width
+        labels[name] = np.where(
+            near & (upper * _STEADY < lower), 1, np.where(near & (lower * _STEADY < upper), -1, 0)
+        ).astype(np.int8)
+    return labels
+
+
+def opposite_sheets(triangles: NDArray[np.integer], labels: NDArray[np.int8], side: int) -> NDArray[np.bool_]:
+    """Mask ``(F,)`` of the triangles that lie wholly on the other sheet than ``side``."""
+    return np.all(labels[triangles] == -side, axis=1)
+
+
+def _along(path: Ids, posed: Array, vertices: Array) -> Ids:
+    """The path, turned round if it runs against the source's line."""
+    ends = vertices[path[[0, -1]]]
+    straight = np.linalg.norm(ends - posed[[0, -1]], axis=1).sum()
+    crossed = np.linalg.norm(ends[::-1] - posed[[0, -1]], axis=1).sum()
+    return path if straight <= crossed else path[::-1]
+
+
+def _split(ids: Ids, path: Ids, posed: Array, vertices: Array) -> list[tuple[Ids, Ids]]:
+    apart = np.linalg.norm(posed[ids][:, None] - posed[ids][None], axis=2)
+    first, last = sorted(int(i) for i in np.unravel_index(np.argmax(apart), apart.shape))
+    corners = [int(np.argmin(np.linalg.norm(vertices[path] - posed[ids[k]], axis=1))) for k in (first, last)]
+    if corners[0] == corners[1]:
+        return []
+    halves, over = _halves(ids, first, last), _halves(path, corners[0], corners[1])
+    middle = posed[halves[0]].mean(axis=0)
+    if np.linalg.norm(vertices[over[1]].mean(axis=0) - middle) < np.linalg.norm(
+        vertices[over[0]].mean(axis=0) - middle
+    ):
+        over = over[::-1]
+    return list(zip(halves, over, strict=True))
+
+
+def _halves(ring: Ids, first: int, last: int) -> list[Ids]:
+    """The two ways from ``ring[first]`` to ``ring[last]``."""
+    turned = np.roll(ring, -first)
+    split = (last - first) % len(ring)
+    return [turned[: split + 1], np.append(turned[split:], turned[0])[::-1]]
+
+
+def _faired(points: Array, rounds: int = 3) -> Array:
+    """Take the zigzag of edge paths out of a polyline ``(m, 3)``; its ends stay."""
+    smooth = points.copy()
+    for _ in range(rounds):
+        smooth[1:-1] = 0.5 * smooth[1:-1] + 0.25 * (smooth[:-2] + smooth[2:])
+    return smooth

@@ -1,0 +1,108 @@
+"""What of a head is skin, and what lies behind the lips and the lids and only has to follow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from toolkit.mesh import TriangleMesh, vertex_adjacency, vertex_areas, vertex_normals
+
+__all__ = ["behind_loops", "exposure", "find_interior", "minor_components"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_RAYS = 96
+_HIDDEN = 0.08
+"""Share of the sky, weighted by the cosine, below which a point counts as hidden: nostrils and the corners of the
+eyes see more, the mouth bag behind closed lips sees nothing."""
+
+
+def find_interior(mesh: TriangleMesh, loops: Sequence[NDArray[np.integer]] = ()) -> Mask:
+    """Mask ``(V,)`` of the vertices that are not facial skin: mouth bag, eye sockets, eyeballs, teeth.
+
+    Parameters
+    ----------
+    mesh : the head
+    loops : closed rings of vertex ids (consecutive ones joined by edges) round openings: inner lip line, lid rims.
+        Everything that they cut off from the largest part is interior; the ring itself is skin.
+
+    Three signs, any of which suffices: another connected component than the largest; cut off by a loop; hidden, that
+    is, sees less than 8 % of the sky. Small islands of the mask, and small holes in it, are filled in.
+    """
+    return minor_components(mesh) | behind_loops(mesh, loops) | _hidden(mesh)
+
+
+def minor_components(mesh: TriangleMesh) -> Mask:
+    """Mask ``(V,)`` of all but the component with the largest area."""
+    return _all_but_largest(vertex_adjacency(mesh.triangles, mesh.n_vertices), _areas(mesh))
+
+
+def behind_loops(mesh: TriangleMesh, loops: Sequence[NDArray[np.integer]]) -> Mask:
+    """Mask ``(V,)`` of what closed rings of vertices cut off from the part with the largest area."""
+    on_loop = np.zeros(mesh.n_vertices, dtype=bool)
+    for loop in loops:
+        on_loop[np.asarray(loop)] = True
+    if not on_loop.any():
+        return np.zeros(mesh.n_vertices, dtype=bool)
+    free = sp.diags((~on_loop).astype(float))
+    cut = free @ vertex_adjacency(mesh.triangles, mesh.n_vertices) @ free
+    return _all_but_largest(sp.csr_matrix(cut), np.where(on_loop, 0.0, _areas(mesh))) & ~on_loop
+
+
+def exposure(mesh: TriangleMesh, n_rays: int = _RAYS) -> Array:
+    """Share ``(V,)`` of the sky over each vertex, cosine-weighted, that is not hidden by the mesh itself.
+
+    Deterministic: the same directions for every vertex, those of a spherical Fibonacci set above its tangent plane.
+    """
+    import open3d as o3d
+
+    centre, scale = mesh.vertices.mean(axis=0), 1.0 / max(mesh.diagonal, 1e-300)
+    points = ((mesh.vertices - centre) * scale).astype(np.float32)
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(o3d.core.Tensor(points), o3d.core.Tensor(mesh.triangles.astype(np.uint32)))
+    normals = vertex_normals(mesh.vertices, mesh.triangles).astype(np.float32)
+    start = points + np.float32(1e-4) * normals
+    seen, whole = np.zeros(len(points)), np.zeros(len(points))
+    for direction in _fibonacci_sphere(n_rays).astype(np.float32):
+        cosine = normals @ direction
+        up = np.flatnonzero(cosine > 0)
+        rays = np.concatenate([start[up], np.broadcast_to(direction, (len(up), 3))], axis=1)
+        blocked = scene.test_occlusions(o3d.core.Tensor(np.ascontiguousarray(rays))).numpy()
+        whole[up] += cosine[up]
+        seen[up] += np.where(blocked, 0.0, cosine[up])
+    return seen / np.maximum(whole, 1e-12)
+
+
+def _hidden(mesh: TriangleMesh) -> Mask:
+    """Hidden vertices, after a median of neighbours that drops lone ones, in patches that are more than specks."""
+    adjacency = vertex_adjacency(mesh.triangles, mesh.n_vertices)
+    degree = np.maximum(np.asarray(adjacency.sum(axis=1)).ravel(), 1)
+    mask = (exposure(mesh) < _HIDDEN).astype(float)
+    for _ in range(3):
+        mask = ((adjacency @ mask + mask) / (degree + 1) > 0.5).astype(float)
+    hidden = mask > 0
+    inside = sp.diags(mask)
+    _, labels = connected_components(sp.csr_matrix(inside @ adjacency @ inside), directed=False)
+    share = np.bincount(labels, weights=np.where(hidden, _areas(mesh), 0.0)) / max(_areas(mesh).sum(), 1e-300)
+    return hidden & (share[labels] > 1e-3)
+
+
+def _all_but_largest(adjacency: sp.csr_matrix, areas: Array) -> Mask:
+    _, labels = connected_components(adjacency, directed=False)
+    return labels != np.argmax(np.bincount(labels, weights=areas))
+
+
+def _areas(mesh: TriangleMesh) -> Array:
+    return vertex_areas(mesh.vertices, mesh.triangles)
+
+
+def _fibonacci_sphere(n: int) -> Array:
+    k = np.arange(n) + 0.5
+    height, angle = 1 - 2 * k / n, np.pi * (1 + 5**0.5) * k
+    radius = np.sqrt(1 - height**2)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
