@@ -12,7 +12,14 @@ from toolkit.contacts import ContactMap, find_contacts
 from toolkit.errors import InputError
 from toolkit.feature_lines import FeatureLine, Opening, line_edges
 from toolkit.mesh import TriangleMesh
-from toolkit.transfer import DeformationTransfer, TransferParameters, deformation_gradients, line_gradients
+from toolkit.operators import gradient
+from toolkit.transfer import (
+    DeformationTransfer,
+    TransferParameters,
+    deformation_gradients,
+    line_gradients,
+    triangle_weights,
+)
 
 PLAIN = TransferParameters(feature_lines=False, contacts=False)
 
@@ -96,6 +103,7 @@ def test_onto_itself_gives_the_source(bump: TriangleMesh, take: np.ndarray, with
         motion,
         line_edges(lines) if with_lines else None,
         pairs if with_lines else None,
+        weights=triangle_weights(bump.vertices, shapes, bump.triangles),
     )
     result = transfer.solve(shapes, contact_map(pairs.gaps(shapes)))
     assert np.abs(result - shapes).max() < 1e-9 * bump.diagonal
@@ -214,18 +222,48 @@ def test_gradients_of_a_linear_map(bump: TriangleMesh) -> None:
     assert np.allclose(deformation_gradients(collapsed, 2 * collapsed, np.array([[0, 1, 2]])), np.eye(3))
 
 
-def test_the_normal_equations_are_those_of_the_energy(bump: TriangleMesh) -> None:
+@pytest.mark.parametrize("weighted", [False, True])
+def test_the_normal_equations_are_those_of_the_energy(bump: TriangleMesh, weighted: bool) -> None:
     """Oracle by another solver: the stacked rows, solved iteratively."""
     source, triangles = small_patch(bump)
     target, shape = other_face(TriangleMesh(source, triangles)), bent(source)
-    transfer = DeformationTransfer(source, target, triangles, np.ones(len(source)), parameters=PLAIN)
-    rows = sp.vstack([transfer._gradient, sp.diags(transfer._gauge_weight) @ transfer._gauge])
+    weights = np.linspace(0.2, 1, len(triangles)) if weighted else np.ones(len(triangles))
+    transfer = DeformationTransfer(
+        source, target, triangles, np.ones(len(source)), parameters=PLAIN, weights=weights if weighted else None
+    )
+    root = np.repeat(np.sqrt(weights), 3)
+    rows = sp.vstack([sp.diags(root) @ gradient(target, triangles), sp.diags(transfer._gauge_weight) @ transfer._gauge])
     change = (deformation_gradients(source, shape, triangles) - np.eye(3)).transpose(0, 2, 1).reshape(-1, 3)
     held = transfer._gauge_weight[:, None] * (transfer._gauge @ (shape - source))
     result = transfer.solve(shape[None])[0] - target
     for c in range(3):
-        slow = lsqr(rows, np.concatenate([change[:, c], held[:, c]]), atol=1e-14, btol=1e-14, iter_lim=20000)[0]
+        slow = lsqr(rows, np.concatenate([root * change[:, c], held[:, c]]), atol=1e-14, btol=1e-14, iter_lim=20000)[0]
         assert np.abs(result[:, c] - slow).max() < 1e-7
+
+
+def test_extreme_triangles_count_less(bump: TriangleMesh) -> None:
+    half_turn = Rotation.from_rotvec([0, 0, np.pi]).apply(bump.vertices)
+    assert np.allclose(triangle_weights(bump.vertices, bump.vertices[None], bump.triangles), 1)
+    # |J - I|^2 of a half turn is 4 + 4; the largest of all shapes counts.
+    weights = triangle_weights(bump.vertices, np.stack([half_turn, bump.vertices]), bump.triangles)
+    assert np.allclose(weights, 1 / 9)
+    collapsed = np.array([[0, 0, 0.0], [1, 0, 0], [2, 0, 0]])
+    assert np.allclose(triangle_weights(collapsed, 9 * collapsed[None], np.array([[0, 1, 2]])), 1)
+
+
+def test_a_crumpled_spot_bends_its_surroundings_less(bump: TriangleMesh) -> None:
+    """A line of the source folds over itself; away from it nothing moves, and the target's skin should not either."""
+    x, y, _ = bump.vertices.T
+    fold = np.exp(-(((x - 0.1) / 0.12) ** 2) - ((y + 0.1) / 0.3) ** 2)
+    shape = bump.vertices + np.stack([-2.5 * (x - 0.1) * fold, 0.2 * fold, 0.3 * fold], axis=1)
+    target = other_face(bump)
+    far = np.hypot(x - 0.1, y + 0.1) > 0.7
+    moved = []
+    for weights in (None, triangle_weights(bump.vertices, shape[None], bump.triangles)):
+        motion = np.linalg.norm(shape - bump.vertices, axis=1)
+        transfer = DeformationTransfer(bump.vertices, target, bump.triangles, motion, parameters=PLAIN, weights=weights)
+        moved.append(np.sqrt(np.mean((transfer.solve(shape[None])[0] - target)[far] ** 2)))
+    assert moved[1] < 0.9 * moved[0]
 
 
 def test_bad_weights() -> None:

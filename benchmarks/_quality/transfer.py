@@ -44,7 +44,7 @@ __all__ = ["Case", "figure3_section", "make_case", "stillness_section", "transfe
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
 
-PLAIN = {"feature_lines": False, "contacts": False}
+PLAIN = {"feature_lines": False, "contacts": False, "robust": False}
 _NEAR_CM = 1.0
 # Crossings and flips are counted in so many frames, evenly spaced: they cost more than the transfer itself.
 _COUNTED = 31

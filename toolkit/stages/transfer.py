@@ -14,7 +14,7 @@ from toolkit.shot import Shot, StageFolder
 from toolkit.stages.bases import load_pairs
 from toolkit.stages.inputs import load_lines, load_mesh
 from toolkit.stages.register import load_target
-from toolkit.transfer import DeformationTransfer
+from toolkit.transfer import DeformationTransfer, triangle_weights
 
 __all__ = ["target_decomposer", "work"]
 
@@ -29,6 +29,7 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     deltas, details = shot.array("decompose", "smooth_deltas"), shot.array("decompose", "details")
     shapes = smooth + deltas[frames]
     motion = _motion(deltas)
+    weights = triangle_weights(smooth, shapes, source.triangles) if shot.config.transfer.robust else None
     progress("factorising", 0, 1)
     system = DeformationTransfer(
         smooth,
@@ -38,6 +39,7 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
         line_edges(load_lines(shot)),
         pairs,
         shot.config.transfer,
+        weights,
     )
     progress("factorising", 1, 1)
     gain = detail_gain(shot.config.details, smooth, target.rest.smooth, source.triangles)
