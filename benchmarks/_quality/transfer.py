@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,6 +43,7 @@ __all__ = ["Case", "figure3_section", "make_case", "stillness_section", "transfe
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
+Frames = Sequence[NDArray] | NDArray
 
 PLAIN = {"feature_lines": False, "contacts": False, "robust": False}
 _NEAR_CM = 1.0
@@ -98,26 +99,26 @@ def make_case(samples: SamplePaths, name: str, folder: Path, count: int | None, 
 
 def transfer_section(case: Case, folder: Path, progress: Progress) -> Section:
     """Errors on the known answer beside simpler methods, then contacts, crossings and unrest of the full take."""
-    rows: list[Row] = []
     shot = case.shot(folder / "smooth_shot", case.smooth)
-    rest = case.truth.shape(np.zeros(52))
+    rows: list[Row] = []
     for label, parameters in (("Mien", {}), ("plain deformation transfer", PLAIN)):
         shot = run_with(shot, progress, transfer=parameters)
-        rows += _error_rows(case, shot, label, shot.array("result", "frames"), rest)
-        if label != "Mien":
-            rows += _contact_rows(case, shot, case.smooth, label, goals=False)
-            rows += _crossing_rows(case, label, shot.array("result", "frames"))
-    rows += _error_rows(case, shot, "copied displacements", _copied(case, shot), rest)
+        rows += _rows_beside_truth(case, shot, label, shot.array("result", "frames"))
+    rows += _rows_beside_truth(case, shot, "copied displacements", list(_copied(case, shot)))
     rows += _crossing_rows(case, "known answer", known_answer(shot, case.truth, case.smooth))
     shot = run_with(case.shot(folder / "full_shot", case.full), progress)
-    rows += _contact_rows(case, shot, case.full, "Mien", goals=True)
-    rows += _crossing_rows(case, "source", case.full.sequence().read(0, len(case.full.weights)))
-    rows += _crossing_rows(case, "Mien", shot.array("result", "frames"))
+    label = "Mien with wrinkles"
+    rows += _crossing_rows(case, "source with wrinkles", case.full.sequence().read(0, len(case.full.weights)))
+    rows += _crossing_rows(case, label, shot.array("result", "frames"))
+    rows += _contact_rows(case, shot, case.full, label, shot.array("result", "frames"), goals=True)
     rows += _unrest_rows(case, shot)
     about = (
-        f"{case.name}, {len(case.full.weights)} frames. Errors: RMS |result - truth| / RMS |truth - rest|, on the "
-        "performance without relief and wrinkles, since the known answer has none; whole surface, details included. "
-        "Contacts, crossings and unrest of Mien: on the performance with wrinkles."
+        f"{case.name}, {len(case.full.weights)} frames. Errors: RMS |result - truth| / RMS |truth - rest| on the "
+        "performance without relief and wrinkles, since the known answer has none; whole surface, details included; "
+        "the error of the motion, so that of a registered rest pose is left out. "
+        "The known answer adds the same offsets in centimetres to every human head, so copying displacements is "
+        "nearly right by construction; it closes no lid. The goals of contacts and of unrest are judged on the "
+        "performance with wrinkles; unrest may exceed the source's as far as the known answer's does."
     )
     return Section(f"transfer onto {case.name}", about, tuple(rows))
 
@@ -125,15 +126,12 @@ def transfer_section(case: Case, folder: Path, progress: Progress) -> Section:
 def figure3_section(case: Case, folder: Path, progress: Progress) -> Section:
     """The four combinations of feature lines and contacts."""
     shot = case.shot(folder / "smooth_shot", case.smooth)
-    rest = case.truth.shape(np.zeros(52))
     rows: list[Row] = []
     for lines in (False, True):
         for contacts in (False, True):
             label = f"lines {'on ' if lines else 'off'} contacts {'on ' if contacts else 'off'}"
             shot = run_with(shot, progress, transfer={"feature_lines": lines, "contacts": contacts})
-            rows += _error_rows(case, shot, label, shot.array("result", "frames"), rest)
-            rows += _contact_rows(case, shot, case.smooth, label, goals=False)
-            rows += _crossing_rows(case, label, shot.array("result", "frames"))
+            rows += _rows_beside_truth(case, shot, label, shot.array("result", "frames"))
     about = f"{case.name}: the paper's Figure 3 in numbers, on the performance without wrinkles."
     return Section(f"figure 3 on {case.name}", about, tuple(rows))
 
@@ -148,9 +146,20 @@ def stillness_section(case: Case, folder: Path, frame: int, progress: Progress) 
     return Section("stillness", f"{case.name}, one frame held for 40 frames; in the target's unit.", tuple(rows))
 
 
-def _error_rows(case: Case, shot: Shot, label: str, result: Iterable[NDArray], rest: Array) -> list[Row]:
-    frames = list(result)
-    steady = list(_steady(shot, case.smooth, frames))
+def _rows_beside_truth(case: Case, shot: Shot, label: str, frames: Frames) -> list[Row]:
+    """Errors, open contacts and crossings of a result of the take without wrinkles."""
+    return [
+        *_error_rows(case, shot, label, frames),
+        *_contact_rows(case, shot, case.smooth, label, frames, goals=False),
+        *_crossing_rows(case, label, frames),
+    ]
+
+
+def _error_rows(case: Case, shot: Shot, label: str, frames: Frames) -> list[Row]:
+    rest = case.truth.shape(np.zeros(52))
+    # The motion is judged, not the registration: with --register the two rest poses differ.
+    shift = rest - np.array(shot.array("register", "target_vertices"))
+    steady = [frame + shift for frame in _steady(shot, case.smooth, frames)]
     truth = [case.truth.shape(w) for w in case.smooth.weights]
     whole = motion_error(steady, truth, rest)
     near = motion_error(steady, truth, rest, case.near)
@@ -182,18 +191,20 @@ def _copied(case: Case, shot: Shot) -> Iterator[Array]:
         yield moved @ placed.rotations[t].T + placed.translations[t]
 
 
-def _contact_rows(case: Case, shot: Shot, take: Take, label: str, *, goals: bool) -> list[Row]:
+def _contact_rows(
+    case: Case, shot: Shot, take: Take, label: str, result: Iterable[NDArray], *, goals: bool
+) -> list[Row]:
     """Worst excess gap of each opening over all frames, in percent of the face's height."""
     rows = []
     rest, own = take.mesh().vertices, np.array(shot.array("register", "target_vertices"))
     source = take.sequence().read(0, len(take.weights))
     for opening in case.openings:
-        gaps = contact_gaps(opening, source, shot.array("result", "frames"), rest, own, *case.heights)
+        gaps = contact_gaps(opening, source, result, rest, own, *case.heights)
         name = f"{label}: {opening.name}, largest gap where the source touches"
         worst = 100 * gaps.worst
         rows.append(at_most(name, worst, 0.5, "% face") if goals else measured(name, worst, "% face"))
         if goals:
-            rows.append(measured(f"{label}: {opening.name}, frames that touch", float(np.count_nonzero(gaps.touching))))
+            rows.append(measured(f"{label}: {opening.name}, frames in which the source closes it", gaps.closed_frames))
     return rows
 
 

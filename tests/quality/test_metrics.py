@@ -45,6 +45,7 @@ def test_lids_must_close_where_the_source_does(mouth):
     almost = vertices * [1, 0.1, 1]
     gaps = contact_gaps(opening, [vertices, closed], [2 * vertices, 2 * almost], vertices, 2 * vertices, 10.0, 20.0)
     assert gaps.touching.tolist() == [0, 14]
+    assert gaps.closed_frames == 1
     assert gaps.excess[0] == 0
     # 0.2 apart on either side of the closed line, on a face twice as large: 0.4 of 20.
     assert gaps.worst == pytest.approx(0.02)

@@ -21,12 +21,13 @@ Frames = Iterable[NDArray[np.floating]]
 class ContactGaps:
     """How well an opening closes where the source's does.
 
-    ``touching`` (T,) how many of the rims' vertices touch in the source; ``excess`` (T,) the largest gap of these on
-    the target beyond what is allowed to stay, as a share of the target's face height (0 where none touches);
+    ``touching`` (T,) how many of the rims' ``vertices`` touch in the source; ``excess`` (T,) the largest gap of these
+    on the target beyond what is allowed to stay, as a share of the target's face height (0 where none touches);
     ``mean`` (T,) the mean gap over the whole rim, same unit.
     """
 
     name: str
+    vertices: int
     touching: NDArray[np.int64]
     excess: Array
     mean: Array
@@ -35,6 +36,11 @@ class ContactGaps:
     def worst(self) -> float:
         """Largest excess over all frames."""
         return float(self.excess.max(initial=0))
+
+    @property
+    def closed_frames(self) -> int:
+        """Frames in which at least half of the rims touch in the source (near the corners some always do)."""
+        return int(np.count_nonzero(2 * self.touching >= self.vertices))
 
 
 def inner_rim(opening: Opening) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -84,7 +90,7 @@ def contact_gaps(
         count.append(np.count_nonzero(touches))
         excess.append(float(np.max((gap - allowed)[touches], initial=0)) / target_height)
         mean.append(float(gap.mean()) / target_height)
-    return ContactGaps(opening.name, np.array(count), np.array(excess), np.array(mean))
+    return ContactGaps(opening.name, len(allowed), np.array(count), np.array(excess), np.array(mean))
 
 
 def _to_polyline(points: NDArray[np.floating], line: NDArray[np.floating]) -> Array:
