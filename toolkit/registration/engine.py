@@ -13,13 +13,13 @@ from scipy.spatial import cKDTree
 
 from toolkit.errors import RegistrationError
 from toolkit.feature_lines import FeatureLine
-from toolkit.mesh import TriangleMesh
+from toolkit.mesh import TriangleMesh, connected_components
 from toolkit.operators import uniform_laplacian
 from toolkit.progress import Progress, silent
 from toolkit.registration.coarse import Coarse, decimate
 from toolkit.registration.consistency import check_landmarks, misfit
 from toolkit.registration.curves import Curve, match_lines, opposite_sheets, rim_loops, sheet_labels
-from toolkit.registration.finish import project, smooth_field
+from toolkit.registration.finish import follow, project, smooth_field, unfold
 from toolkit.registration.interior import find_interior
 from toolkit.registration.landmarks import Landmarks
 from toolkit.registration.nonrigid import SheetedSurface, solve_field
@@ -190,15 +190,13 @@ class _Job:
             progress,
         )
         moved = self.posed + smooth_field(self.source.triangles, coarse.prolong @ field)
-        if not parameters.project:
-            return moved
-        progress("projecting", 0, 1)
-        rims = [curve for curve in self.curves if curve.opening]
-        moved = project(
-            self.source.with_vertices(moved), self.skin, self.surface, self.labels, rims, self.extent, parameters
-        )
-        progress("projecting", 1, 1)
-        return moved
+        if parameters.project:
+            rims = [curve for curve in self.curves if curve.opening]
+            near = self.source.with_vertices(moved)
+            moved = project(near, self.skin, self.surface, self.labels, rims, self.extent, parameters)
+        moved = unfold(self.source.with_vertices(self.posed), moved, self.skin)
+        _, parts = connected_components(self.source.triangles, self.source.n_vertices)
+        return follow(self.source, self.posed, moved, self.skin, parts)
 
     def judge(self, vertices: Array, parameters: RegistrationParameters, warnings: Sequence[str]) -> Registration:
         """The result with its numbers, or a refusal."""
@@ -253,7 +251,7 @@ class _Job:
             )
         if quality.flipped_share > parameters.max_flips:
             raise RegistrationError(
-                f"{quality.flipped_share:.1%} of the face's triangles are turned over (limit {parameters.max_flips:.0%})",
+                f"{quality.flipped_share:.1%} of the triangles are turned over (limit {parameters.max_flips:.0%})",
                 where="registration",
                 remedy=f"add landmarks where it folds, and check the worst one, {quality.landmark_worst!r}",
             )

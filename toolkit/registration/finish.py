@@ -7,14 +7,17 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from toolkit.mesh import TriangleMesh, vertex_adjacency, vertex_normals
+from toolkit.errors import InputError
+from toolkit.mesh import TriangleMesh, face_normals, vertex_adjacency, vertex_normals
 from toolkit.registration.curves import Curve, closest_on_polyline
 from toolkit.registration.nonrigid import SheetedSurface, accepted
 from toolkit.registration.parameters import RegistrationParameters
+from toolkit.rigid import umeyama
 from toolkit.solve import factorise
 
-__all__ = ["project", "smooth_field"]
+__all__ = ["follow", "project", "smooth_field", "unfold"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -22,6 +25,8 @@ Mask = NDArray[np.bool_]
 _STEPS = 4
 _NEAR = 0.01
 """Only vertices whose offset is under this share of the extent are moved onto the surface."""
+_UNFOLDINGS, _TURNED = 5, 0.1
+_NEIGHBOURS = 24
 
 
 def smooth_field(triangles: NDArray[np.integer], field: Array, rounds: int = 4) -> Array:
@@ -40,26 +45,26 @@ def project(
     skin: Mask,
     surface: SheetedSurface,
     labels: Mapping[str, NDArray[np.int8]],
-    curves: Sequence[Curve],
+    rims: Sequence[Curve],
     extent: float,
     parameters: RegistrationParameters,
 ) -> Array:
     """Positions ``(V, 3)`` on the target's surface, of a mesh that lies near it already.
 
     Each skin vertex goes along its own (averaged) normal, in Newton steps: a closest point would gather vertices on
-    ridges and tear them apart in creases, which is what makes lid rims ragged. Vertices of a rim go to the nearest
-    point of the target's rim curve instead, and everything else (behind the rims, and where no closest point can
-    be believed) follows its neighbours by a harmonic fill.
+    ridges and tear them apart in creases, which is what makes lid rims ragged. Vertices of a rim go to the target's
+    rim curve instead, by offsets that are smooth along it. Skin without a believable closest point follows its
+    neighbours by a harmonic fill.
     """
     start = mesh.vertices
     points = start.copy()
-    rim = np.zeros(len(start), dtype=bool)
-    for curve in curves:
-        rim[curve.vertices] = True
-        points[curve.vertices] = closest_on_polyline(start[curve.vertices], curve.points)
+    known = ~skin
+    for rim in rims:
+        points[rim.vertices] += _rim_offsets(start[rim.vertices], rim)
+        known[rim.vertices] = True
     normals = smooth_field(mesh.triangles, vertex_normals(start, mesh.triangles), rounds=2)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    free = np.flatnonzero(skin & ~rim)
+    free = np.flatnonzero(~known)
     held = {name: values[free] for name, values in labels.items()}
     good = np.ones(len(free), dtype=bool)
     for _ in range(_STEPS):
@@ -70,9 +75,85 @@ def project(
         gap = np.einsum("nd,nd->n", hits.points - points[free], hits.normals)
         points[free] += np.where(good, gap / np.maximum(slope, 0.5), 0.0)[:, None] * normals[free]
     good &= np.linalg.norm(points[free] - start[free], axis=1) < _NEAR * extent
-    known = rim.copy()
     known[free[good]] = True
     return start + _harmonic_fill(mesh.triangles, points - start, known)
+
+
+def unfold(posed: TriangleMesh, points: Array, skin: Mask) -> Array:
+    """Smooth out triangles that are turned over, or nearly, against the pose ``posed`` in which none is.
+
+    Round them the displacement from that pose is filled in from outside, over a ring that grows while it is needed.
+    """
+    triangles = posed.triangles
+    adjacency = vertex_adjacency(triangles, len(points)).astype(bool)
+    whole = skin[triangles].all(axis=1)
+    before = face_normals(posed.vertices, triangles)
+    loose = np.zeros(len(points), dtype=bool)
+    for _ in range(_UNFOLDINGS):
+        after = face_normals(points, triangles)
+        around = vertex_normals(points, triangles)[triangles].mean(axis=1)
+        bad = whole & (
+            (np.einsum("fd,fd->f", before, after) < _TURNED) | (np.einsum("fd,fd->f", after, around) < _TURNED)
+        )
+        if not bad.any():
+            break
+        seeds = np.zeros(len(points), dtype=bool)
+        seeds[triangles[bad]] = True
+        loose |= seeds | np.asarray(adjacency @ seeds)
+        loose &= skin
+        points = posed.vertices + _harmonic_fill(triangles, points - posed.vertices, ~loose)
+    return points
+
+
+def follow(mesh: TriangleMesh, posed: Array, points: Array, skin: Mask, parts: NDArray[np.integer]) -> Array:
+    """Carry along what is not skin, ``(V, 3)``: mouth bag, sockets, eyeballs, teeth.
+
+    Each such vertex takes the mean displacement from ``posed`` of the nearest skin, weighted by the inverse square
+    of the distance: nearness in space, not along the surface, keeps the bag inside the cheek whatever becomes of it.
+    Separate components (``parts`` (V,), all but the skin's) move by the similarity that fits theirs best, so that
+    eyeballs stay round.
+    """
+    hidden = np.flatnonzero(~skin)
+    if not len(hidden) or not skin.any():
+        return points
+    visible = np.flatnonzero(skin)
+    distance, nearest = cKDTree(posed[visible]).query(posed[hidden], k=min(_NEIGHBOURS, len(visible)))
+    distance, nearest = distance.reshape(len(hidden), -1), nearest.reshape(len(hidden), -1)
+    weight = 1 / np.maximum(distance, 1e-9 * mesh.diagonal) ** 2
+    weight /= weight.sum(axis=1, keepdims=True)
+    displacement = points - posed
+    displacement[hidden] = np.einsum("nk,nkd->nd", weight, displacement[visible][nearest])
+    even = smooth_field(mesh.triangles, displacement, rounds=6)
+    moved = points.copy()
+    moved[hidden] = posed[hidden] + even[hidden]
+    main = np.bincount(parts[visible]).argmax()
+    for part in np.unique(parts[hidden]):
+        ids = np.flatnonzero(parts == part)
+        if part != main and len(ids) >= 4:
+            moved[ids] = _moved_whole(mesh.vertices[ids], moved[ids])
+    return moved
+
+
+def _moved_whole(source: Array, target: Array) -> Array:
+    try:
+        return umeyama(source, target).apply(source)
+    except InputError:  # a part without extent in two directions
+        return target
+
+
+def _rim_offsets(points: Array, rim: Curve) -> Array:
+    """Offsets ``(n, 3)`` to the rim's curve, low-passed along it; corners keep theirs.
+
+    The target's line runs along edges, so it zigzags by a share of an edge; what is finer than two of its edges is
+    not the rim's shape.
+    """
+    offsets = closest_on_polyline(points, rim.points) - points
+    spacing = np.linalg.norm(np.diff(points, axis=0), axis=1).mean()
+    edge = np.linalg.norm(np.diff(rim.points, axis=0), axis=1).mean()
+    rounds = int(np.clip(2 * (edge / max(spacing, 1e-300)) ** 2, 1, 100))
+    for _ in range(rounds):
+        offsets[1:-1] = 0.5 * offsets[1:-1] + 0.25 * (offsets[:-2] + offsets[2:])
+    return offsets
 
 
 def _harmonic_fill(triangles: NDArray[np.integer], values: Array, known: Mask) -> Array:

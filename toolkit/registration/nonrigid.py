@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from toolkit.mesh import TriangleMesh, vertex_adjacency, vertex_normals
+from toolkit.mesh import TriangleMesh, unique_edges, vertex_normals
 from toolkit.operators import uniform_laplacian
 from toolkit.progress import Progress
 from toolkit.registration.coarse import Coarse
@@ -25,6 +25,9 @@ Mask = NDArray[np.bool_]
 
 _REFERENCE_SIZE = 1e4
 """The stiffness is stated for a mesh of this many vertices; a uniform bi-Laplacian grows with the square."""
+
+
+_INNER_BENDING, _INNER_MEMBRANE = 0.1, 0.1
 
 
 class SheetedSurface:
@@ -105,8 +108,7 @@ def solve_field(
     landmarks : source ids (N,) and target points (N, 3)
     """
     mesh, size = coarse.mesh, coarse.mesh.n_vertices
-    bending, stretching = _energies(mesh, parameters.membrane)
-    energy = (bending + stretching).tocsr()
+    energy = _energy(mesh, skin, parameters.membrane)
     pull = energy @ reference
     constraints = list(_constraints(coarse, posed, landmarks, curves, parameters))
     field = np.zeros((size, 3))
@@ -127,13 +129,22 @@ def solve_field(
     return field
 
 
-def _energies(mesh: TriangleMesh, membrane: float) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+def _energy(mesh: TriangleMesh, skin: Mask, membrane: float) -> sp.csr_matrix:
+    """Bending and stretching ``(C, C)`` of the skin; what is behind it is a membrane only.
+
+    Bending would carry the slope at a lid's rim on into the socket, where nothing holds it, and out through the
+    cheek; a membrane's displacements stay between those of its rims.
+    """
     n = mesh.n_vertices
-    laplacian = uniform_laplacian(mesh.triangles, n)
-    adjacency = vertex_adjacency(mesh.triangles, n)
-    graph = sp.diags(np.asarray(adjacency.sum(axis=1)).ravel()) - adjacency
+    laplacian = sp.diags(np.where(skin, 1.0, _INNER_BENDING)) @ uniform_laplacian(mesh.triangles, n)
+    edges = unique_edges(mesh.triangles)
+    weight = np.where(skin[edges].all(axis=1), membrane, max(_INNER_MEMBRANE, membrane))
+    rows = np.repeat(np.arange(len(edges)), 2)
+    ends = sp.csr_matrix((np.tile([1.0, -1.0], len(edges)), (rows, edges.ravel())), shape=(len(edges), n))
     scale = n / _REFERENCE_SIZE
-    return sp.csr_matrix(scale**2 * (laplacian.T @ laplacian)), sp.csr_matrix(membrane * scale * graph)
+    # A breath of screening holds the components that nothing touches.
+    energy = scale**2 * (laplacian.T @ laplacian) + scale * (ends.T @ sp.diags(weight) @ ends) + 1e-9 * sp.identity(n)
+    return sp.csr_matrix(energy)
 
 
 def _constraints(
