@@ -1,0 +1,343 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear, minimize
+
+from toolkit.errors import InputError
+from toolkit.mesh import TriangleMesh
+from toolkit.pose_edit import (
+    DistanceConstraint,
+    EditableTake,
+    EditParameters,
+    FixedConstraint,
+    PointConstraint,
+    PoseEditor,
+)
+from toolkit.pose_edit.constraints import rows_of
+from toolkit.pose_edit.weights_step import WeightsProblem, time_matrix
+
+KEY, TWIN = 18, 51  # frames of a similar expression in `face`
+
+
+def vertex_near(take: EditableTake, x: float, y: float) -> int:
+    return int(np.argmin(((take.rest[:, :2] - [x, y]) ** 2).sum(axis=1)))
+
+
+def corner_pull(take: EditableTake) -> PointConstraint:
+    """Against the main expression of the key frame."""
+    return PointConstraint(KEY, vertex_near(take, 0.3, -0.6), offset=(0.0, -0.03, -0.1))
+
+
+def motion(edited: EditableTake, take: EditableTake, frame: int) -> np.ndarray:
+    return np.sqrt(((edited.smooth_frame(frame) - take.smooth_frame(frame)) ** 2).sum(axis=1))
+
+
+class Joint:
+    """Eq. 12 written out in full, over all K bases and the window's weights, for SciPy."""
+
+    def __init__(self, mesh: TriangleMesh, take: EditableTake, constraints: list, parameters: EditParameters) -> None:
+        self.take, self.rows = take, rows_of(constraints, take)
+        self.first, last = parameters.frames(take.n_frames)
+        self.n = last - self.first + 1
+        problem = PoseEditor(take, mesh.triangles)._problem(self.rows, parameters, (self.first, last))
+        self.time, self.lambda_b, self.lambda_e = problem.weights.time, parameters.lambda_b, problem.lambda_e
+        self.matrix = take.system.matrix.toarray()
+        self.picks = np.zeros((len(self.rows), take.n_vertices))
+        self.picks[:, self.rows.vertices] = self.rows.combination
+        # The Cholesky factor makes the bases' term a sum of squares: SciPy then needs far fewer steps.
+        self.root = np.linalg.cholesky(self.matrix)
+
+    def energy_and_gradient(self, unknowns: np.ndarray) -> tuple[float, np.ndarray]:
+        take, rows = self.take, self.rows
+        size = take.moves.size
+        scaled = unknowns[:size].reshape(take.n_bases, take.n_vertices, 3)
+        delta = np.stack([np.linalg.solve(self.root.T, d) for d in scaled])
+        change = unknowns[size:].reshape(self.n, take.n_bases)
+        weights = take.weights.copy()
+        weights[self.first : self.first + self.n] += change
+        energy = self.lambda_b * (scaled**2).sum() + (change * (self.time @ change)).sum()
+        d_change = 2 * (self.time @ change)
+        d_delta = np.zeros_like(delta)
+        for a, frame in enumerate(rows.frames):
+            at = np.einsum("v,kvc->kc", self.picks[a], take.moves + delta)
+            left = weights[frame] @ at - rows.goals[a]
+            scale = self.lambda_e * rows.weights[a]
+            energy += scale * left @ left
+            d_delta += 2 * scale * np.einsum("k,v,c->kvc", weights[frame], self.picks[a], left)
+            if 0 <= frame - self.first < self.n:
+                d_change[frame - self.first] += 2 * scale * at @ left
+        d_scaled = 2 * self.lambda_b * scaled + np.stack([np.linalg.solve(self.root, d) for d in d_delta])
+        return float(energy), np.concatenate([d_scaled.ravel(), d_change.ravel()])
+
+    def minimum(self) -> float:
+        free = [(None, None)] * self.take.moves.size
+        bounds = free + [(-w, None) for w in self.take.weights[self.first : self.first + self.n].ravel()]
+        found = minimize(
+            self.energy_and_gradient,
+            np.zeros(len(bounds)),
+            jac=True,
+            bounds=bounds,
+            method="L-BFGS-B",
+            options={"maxiter": 5000, "maxfun": 20000, "ftol": 1e-12, "gtol": 1e-7, "maxcor": 40},
+        )
+        return float(found.fun)
+
+
+@pytest.mark.parametrize("lambda_w", [0.05, 1.0])
+def test_reaches_the_energy_of_a_joint_bounded_solve(patch: tuple[TriangleMesh, EditableTake], lambda_w: float) -> None:
+    mesh, take = patch
+    constraints = [
+        PointConstraint(4, 9, offset=(0.1, -0.05, -0.2)),
+        PointConstraint(7, 30, offset=(0.0, -0.2, 0.1), weight=2.0),
+        DistanceConstraint(4, (9, 24), factor=1.4),
+    ]
+    parameters = EditParameters(window=(2, 9), lambda_w=lambda_w, lambda_e=30.0)
+    joint = Joint(mesh, take, constraints, parameters)
+    edit = PoseEditor(take, mesh.triangles).solve(constraints, parameters)
+    assert np.abs(edit.weights - take.weights).max() > 1e-3
+    assert edit.energies[-1] <= 1.01 * joint.minimum()
+    # The energy that it tells is that of the written-out problem.
+    delta = edit.moves.of_bases()
+    scaled = np.stack([joint.root.T @ d for d in delta])
+    change = (edit.weights - take.weights)[2:10]
+    told, _ = joint.energy_and_gradient(np.concatenate([scaled.ravel(), change.ravel()]))
+    assert told == pytest.approx(edit.energies[-1], rel=1e-6)
+
+
+def test_plain_alternation_stops_farther_from_it(patch: tuple[TriangleMesh, EditableTake]) -> None:
+    mesh, take = patch
+    editor = PoseEditor(take, mesh.triangles)
+    pull = [PointConstraint(4, 9, offset=(0.1, -0.05, -0.2))]
+    known, plain = (editor.solve(pull, EditParameters(lambda_w=0.05, coupled=c)) for c in (True, False))
+    assert known.energies[-1] < 0.9 * plain.energies[-1]
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_the_bases_step_solves_the_full_normal_equations(patch: tuple[TriangleMesh, EditableTake], held: bool) -> None:
+    mesh, take = patch
+    constraints: list = [
+        PointConstraint(4, 9, offset=(0.1, -0.05, -0.2)),
+        PointConstraint(7, 30, offset=(0.0, -0.2, 0.1), weight=2.0),
+        PointConstraint(4, 30, place=(0.3, 0.1, 0.2)),
+        DistanceConstraint(10, (9, 24), length=0.3),
+    ]
+    fixed = np.array([0, 1, 2, 40, 41] if held else [], dtype=int)
+    if held:
+        constraints.append(FixedConstraint(tuple(fixed.tolist())))
+    parameters = EditParameters(mode="bases", lambda_b=2.0)
+    joint = Joint(mesh, take, constraints, parameters)
+    free = np.setdiff1d(np.arange(take.n_vertices), fixed)
+    full = joint.lambda_b * np.kron(np.eye(take.n_bases), joint.matrix[np.ix_(free, free)])
+    right = np.zeros((len(full), 3))
+    for a, frame in enumerate(joint.rows.frames):
+        row = np.kron(take.weights[frame], joint.picks[a, free])
+        scale = joint.lambda_e * joint.rows.weights[a]
+        full += scale * np.outer(row, row)
+        moved = np.einsum("k,v,kvc->c", take.weights[frame], joint.picks[a], take.moves)
+        right += scale * np.outer(row, joint.rows.goals[a] - moved)
+    expected = np.zeros_like(take.moves)
+    expected[:, free] = np.linalg.solve(full, right).reshape(take.n_bases, -1, 3)
+    found = PoseEditor(take, mesh.triangles).solve(constraints, parameters)
+    assert np.abs(found.moves.of_bases() - expected).max() < 1e-8 * np.abs(expected).max()
+    assert found.weights.tobytes() == take.weights.tobytes()
+    assert np.allclose(found.bases(), take.rest + take.moves + expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("with_gram", [False, True])
+def test_the_weights_step_equals_a_dense_bounded_solve(with_gram: bool) -> None:
+    rng = np.random.default_rng(8)
+    n, k, r = 12, 3, 4
+    for tied in ((True, True), (False, True), (False, False)):
+        time = time_matrix(n, *tied, smoothness=1.5)
+        half = rng.normal(size=(k, k))
+        problem = WeightsProblem(time, half @ half.T if with_gram else None, -rng.uniform(0, 0.3, (n, k)))
+        rows = np.zeros((r, n, k))
+        rows[:, [3, 8]] = rng.normal(size=(r, 2, k))
+        goals = 3 * rng.normal(size=r)
+        root = rng.normal(size=(r, r)) + 3 * np.eye(r)
+        found = problem.solve(rows, goals, np.linalg.inv(root.T @ root), np.zeros((n, k)))
+        blocks = [np.kron(np.linalg.cholesky(time.toarray()).T, np.eye(k)), root @ rows.reshape(r, -1)]
+        if with_gram:
+            blocks.append(np.kron(np.eye(n), half.T))
+        stacked = np.vstack(blocks)
+        right = np.zeros(len(stacked))
+        right[n * k : n * k + r] = root @ goals
+        slow = lsq_linear(stacked, right, (problem.lower.ravel(), np.inf), method="bvls", tol=1e-14)
+        assert (found >= problem.lower).all()
+        assert 0 < (found == problem.lower).sum() < found.size
+        assert np.abs(found.ravel() - slow.x).max() < 1e-7
+
+
+def test_without_constraints_nothing_changes(bump: TriangleMesh, face: EditableTake) -> None:
+    editor = PoseEditor(face, bump.triangles)
+    for constraints in ([], [FixedConstraint((1, 2, 3))]):
+        edit = editor.solve(constraints)
+        assert edit.weights.tobytes() == face.weights.tobytes()
+        assert edit.moves is None
+        assert edit.bases().tobytes() == (face.moves + face.rest).tobytes()
+        assert edit.smooth_frame(KEY).tobytes() == face.smooth_frame(KEY).tobytes()
+
+
+def test_bases_reach_similar_expressions_and_weights_stay_in_the_window(bump: TriangleMesh, face: EditableTake) -> None:
+    """The paper's Figure 4."""
+    editor, pull = PoseEditor(face, bump.triangles), corner_pull(face)
+    moved = {}
+    for mode in ("bases", "weights", "both"):
+        edit = editor.solve([pull], EditParameters(mode=mode, window=(8, 28)))
+        moved[mode] = motion(edit.take, face, KEY).max(), motion(edit.take, face, TWIN).max()
+        if mode == "weights":
+            assert edit.moves is None
+            outside = [t for t in range(face.n_frames) if not 8 <= t <= 28]
+            assert edit.weights[outside].tobytes() == face.weights[outside].tobytes()
+        assert (edit.weights >= 0).all()
+    asked = float(np.linalg.norm(pull.offset))
+    assert moved["bases"][0] == pytest.approx(asked, rel=0.02)
+    assert moved["bases"][1] > 0.8 * moved["bases"][0]
+    assert moved["weights"][0] > 0.5 * asked
+    assert moved["weights"][1] == 0
+    assert 0.1 * asked < moved["both"][1] < moved["bases"][1]
+
+
+@pytest.mark.parametrize("window", [(8, 28), (0, 28), (18, 18)])
+def test_window_ends_join_without_a_jump(bump: TriangleMesh, face: EditableTake, window: tuple[int, int]) -> None:
+    parameters = EditParameters(mode="weights", window=window)
+    edit = PoseEditor(face, bump.triangles).solve([corner_pull(face)], parameters)
+    change = np.abs(edit.weights - face.weights).sum(axis=1)
+    first, last = window
+    assert change[:first].max(initial=0) == 0 == change[last + 1 :].max(initial=0)
+    if first != last:
+        # Speed begins small beside the mean slope to the edited frame: a hat would begin with all of it.
+        for joint in [last] if first == 0 else [first, last]:
+            assert 0 < change[joint] < 0.5 * change.max() / abs(KEY - joint)
+
+
+def test_without_smoothness_speed_jumps_where_the_window_ends(bump: TriangleMesh, face: EditableTake) -> None:
+    editor, pull = PoseEditor(face, bump.triangles), corner_pull(face)
+    at_end = []
+    for smoothness in (0.0, 5.0):
+        parameters = EditParameters(mode="weights", window=(8, 28), smoothness=smoothness)
+        change = editor.solve([pull], parameters).weights - face.weights
+        at_end.append(np.abs(change[8]).max() / np.abs(change).max())
+    assert at_end[0] > 1.7 * at_end[1]
+
+
+@pytest.mark.parametrize("mode", ["both", "bases", "weights"])
+def test_what_is_fixed_stays(bump: TriangleMesh, face: EditableTake, mode: str) -> None:
+    """A mouth edit with the rest fixed leaves the forehead."""
+    forehead = np.flatnonzero(face.rest[:, 1] > 0.2)
+    mouth = PointConstraint(KEY, vertex_near(face, 0.0, -0.8), offset=(0.05, -0.05, 0.08))
+    brow = PointConstraint(KEY, vertex_near(face, 0.1, -0.1), offset=(0.0, 0.1, 0.05))
+    fixed = FixedConstraint(tuple(forehead.tolist()))
+    parameters = EditParameters(mode=mode, window=(8, 28))
+    edit = PoseEditor(face, bump.triangles).solve([mouth, brow, fixed], parameters)
+    free = PoseEditor(face, bump.triangles).solve([mouth, brow], parameters)
+    for frame in range(face.n_frames):
+        assert motion(edit.take, face, frame)[forehead].max() < 0.01 * motion(edit.take, face, KEY).max()
+    if mode != "weights":
+        assert motion(free.take, face, KEY)[forehead].max() > 0.1 * motion(free.take, face, KEY).max()
+        assert edit.residuals[0].left < 0.02 * edit.residuals[0].asked
+
+
+def test_fixed_in_one_frame_only(bump: TriangleMesh, face: EditableTake) -> None:
+    pull = corner_pull(face)
+    beside = vertex_near(face, 0.15, -0.6)
+    editor = PoseEditor(face, bump.triangles)
+    plain = editor.solve([pull], EditParameters(mode="bases"))
+    fixed = editor.solve([pull, FixedConstraint((beside,), frames=(KEY,))], EditParameters(mode="bases"))
+    assert motion(fixed.take, face, KEY)[beside] < 0.05 * motion(plain.take, face, KEY)[beside]
+    with pytest.raises(InputError, match="too many"):
+        FixedConstraint(tuple(range(1000)), frames=(KEY,))
+
+
+def test_constraints_are_about_the_visible_surface(bump: TriangleMesh, face: EditableTake) -> None:
+    rng = np.random.default_rng(2)
+    details = 0.02 * rng.normal(size=(face.n_frames, face.n_vertices, 3))
+    seen = replace(face, detail_offset=lambda frame, ids: details[frame, ids])
+    a, b = vertex_near(face, 0.3, -0.6), vertex_near(face, -0.4, -0.5)
+    before = face.smooth_frame(KEY) + details[KEY]
+    place = before[a] + [0.02, 0.03, -0.05]
+    wanted = [PointConstraint(KEY, a, place=tuple(place)), DistanceConstraint(40, (a, b), factor=1.2)]
+    edit = PoseEditor(seen, bump.triangles).solve(wanted, EditParameters(lambda_e=1e6))
+    assert np.abs(edit.smooth_frame(KEY)[a] + details[KEY, a] - place).max() < 1e-4
+    (old, new) = (x[a] - x[b] for x in (face.smooth_frame(40) + details[40], edit.smooth_frame(40) + details[40]))
+    assert np.abs(new - 1.2 * old).max() < 1e-4
+
+
+def test_contradictions_are_told_by_their_residuals(bump: TriangleMesh, face: EditableTake) -> None:
+    v = vertex_near(face, 0.3, -0.6)
+    there, here = (PointConstraint(KEY, v, offset=(0.0, 0.0, z)) for z in (0.1, -0.1))
+    elsewhere = PointConstraint(KEY, vertex_near(face, -0.4, -0.5), offset=(0.0, 0.02, 0.0))
+    edit = PoseEditor(face, bump.triangles).solve([there, here, elsewhere])
+    left = [residual.left for residual in edit.residuals]
+    assert left[0] == pytest.approx(0.1, rel=0.05)
+    assert left[1] == pytest.approx(0.1, rel=0.05)
+    assert left[2] < 1e-3
+    assert edit.residuals[0].asked == pytest.approx(0.1)
+    assert edit.residuals[0].constraint is there
+
+
+def test_dragging_starts_from_the_last_solution_and_commits_the_same(bump: TriangleMesh, face: EditableTake) -> None:
+    editor, pull = PoseEditor(face, bump.triangles), corner_pull(face)
+    parameters = EditParameters(window=(8, 28), lambda_w=0.1)
+    cold = PoseEditor(face, bump.triangles).solve([pull], parameters)
+    for share in (0.2, 0.5, 0.8, 0.99):
+        editor.solve([replace(pull, offset=tuple(share * np.array(pull.offset)))], parameters, warm=True)
+    warm = editor.solve([pull], parameters, warm=True)
+    assert warm.rounds <= cold.rounds
+    assert warm.energies[-1] == pytest.approx(cold.energies[-1], rel=0.01)
+    again = editor.solve([pull], parameters)
+    assert again.weights.tobytes() == cold.weights.tobytes()
+    assert again.smooth_frame(KEY).tobytes() == cold.smooth_frame(KEY).tobytes()
+
+
+def test_a_cancel_leaves_what_was(bump: TriangleMesh, face: EditableTake) -> None:
+    editor, pull = PoseEditor(face, bump.triangles), corner_pull(face)
+    parameters = EditParameters(lambda_w=0.1)
+    before = editor.solve([pull], parameters)
+
+    def cancel(what: str, done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        editor.solve([replace(pull, offset=(1.0, 0.0, 0.0))], parameters, progress=cancel)
+    warm = editor.solve([pull], parameters, warm=True)
+    assert warm.energies[0] == pytest.approx(before.energies[-1], rel=1e-9)
+
+
+def test_edits_stack(bump: TriangleMesh, face: EditableTake) -> None:
+    first = PoseEditor(face, bump.triangles).solve([corner_pull(face)], EditParameters(window=(8, 28)))
+    other = PointConstraint(40, vertex_near(face, 0.0, 0.7), offset=(0.0, 0.0, 0.1))
+    second = PoseEditor(first.take, bump.triangles).solve([other], EditParameters(mode="bases"))
+    assert len(second.take.edits) == 2
+    assert second.residuals[0].left < 0.01 * second.residuals[0].asked
+    ids = np.array([3, 100, 400])
+    assert np.allclose(second.take.moves_at(ids), (second.bases() - face.rest)[:, ids], atol=1e-12)
+    full = face.rest + np.einsum("k,kvc->vc", second.weights[40], second.bases() - face.rest)
+    assert np.allclose(second.smooth_frame(40), full, atol=1e-12)
+
+
+def test_bad_input_is_refused(bump: TriangleMesh, face: EditableTake) -> None:
+    editor = PoseEditor(face, bump.triangles)
+    with pytest.raises(InputError, match="no frame 60"):
+        editor.solve([PointConstraint(60, 0, offset=(0, 0, 0))])
+    with pytest.raises(InputError, match="no vertex -1"):
+        editor.solve([PointConstraint(0, -1, offset=(0, 0, 0))])
+    with pytest.raises(InputError, match="outside the window"):
+        editor.solve([PointConstraint(5, 1, offset=(0, 0, 0))], EditParameters(mode="weights", window=(8, 28)))
+    with pytest.raises(InputError, match="does not lie in the take"):
+        editor.solve([PointConstraint(5, 1, offset=(0, 0, 0))], EditParameters(window=(8, 60)))
+    with pytest.raises(InputError, match="either a place or an offset"):
+        PointConstraint(0, 1)
+    with pytest.raises(InputError, match="no place"):
+        PointConstraint(0, 1, place=(0.0, float("nan"), 0.0))
+    with pytest.raises(InputError, match="either a length or a factor"):
+        DistanceConstraint(0, (1, 2), length=1.0, factor=2.0)
+    with pytest.raises(InputError, match="cannot be had"):
+        DistanceConstraint(0, (1, 1), length=1.0)
+    with pytest.raises(InputError, match="mode cannot be 'loose'"):
+        EditParameters(mode="loose")
+    with pytest.raises(InputError, match="must be positive"):
+        EditParameters(lambda_w=0)

@@ -1,0 +1,265 @@
+"""The alternating solver of Eq. 12.
+
+Each round changes the weights over the window, then the bases. In the paper's alternation each step takes the other's
+unknowns as they are; with strong constraints the first step then does everything and the second finds nothing left to
+do. Here the weights step knows how the bases will answer: eliminating them turns the constraints' weight ``lambda_e``
+into the metric ``M^-1`` of `bases_metric`, at no cost, since ``M`` is small. The rounds then are Gauss-Newton steps on
+the joint problem, and a handful of them reaches its optimum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolkit.errors import InputError
+from toolkit.mesh.topology import unique_edges
+from toolkit.pose_edit.bases_step import Responses, bases_metric
+from toolkit.pose_edit.constraints import Constraint, ConstraintRows, FixedConstraint, rows_of
+from toolkit.pose_edit.parameters import EditParameters
+from toolkit.pose_edit.result import PoseEdit, Residual
+from toolkit.pose_edit.take import EditableTake, LowRankMoves
+from toolkit.pose_edit.weights_step import WeightsProblem, time_matrix
+from toolkit.progress import Progress, silent
+
+__all__ = ["PoseEditor"]
+
+Array = NDArray[np.float64]
+
+_MOST_HALVINGS = 8
+
+
+class PoseEditor:
+    """Solves edits of one take; keeps what the next solve can use, so that dragging is a chain of small solves.
+
+    Parameters
+    ----------
+    take : what is edited
+    triangles : (F, 3) of the mesh
+    """
+
+    def __init__(self, take: EditableTake, triangles: NDArray[np.integer]) -> None:
+        self.take = take
+        edges = unique_edges(triangles)
+        apart = take.rest[edges[:, 0]] - take.rest[edges[:, 1]]
+        self._edge = float(np.median(np.sqrt(np.sum(apart**2, axis=1))))
+        self._reach = _reach(take)
+        self._responses: Responses | None = None
+        self._gram: tuple[NDArray[np.int64], Array] | None = None
+        self._last: tuple[EditParameters, Array] | None = None
+
+    def solve(
+        self,
+        constraints: Sequence[Constraint],
+        parameters: EditParameters | None = None,
+        *,
+        warm: bool = False,
+        progress: Progress = silent,
+    ) -> PoseEdit:
+        """Bases and weights that meet the constraints with the least change.
+
+        ``warm`` begins from the last solution with the same parameters: quicker while a pointer moves, but the result
+        then depends, within the tolerance, on the way there; commit a cold solve. An exception from ``progress``
+        cancels and leaves everything as it was. Without constraints the result is the take itself.
+        """
+        parameters = parameters or EditParameters()
+        window = parameters.frames(self.take.n_frames)
+        rows = rows_of(constraints, self.take)
+        if not len(rows):
+            residuals = tuple(Residual(constraint, 0.0, 0.0) for constraint in constraints)
+            return PoseEdit(self.take, self.take.weights, None, window, residuals, (0.0,))
+        problem = self._problem(rows, parameters, window)
+        change = np.zeros_like(problem.weights.lower)
+        if warm and self._last is not None and self._last[0] == parameters:
+            change = np.maximum(self._last[1], problem.weights.lower)
+        state, energies = _iterate(problem, change, parameters, progress)
+        self._last = (parameters, state.change)
+        return self._result(constraints, rows, problem, state, energies)
+
+    def _problem(self, rows: ConstraintRows, parameters: EditParameters, window: tuple[int, int]) -> _Problem:
+        take = self.take
+        first, last = window
+        n = last - first + 1
+        inside = (rows.frames >= first) & (rows.frames <= last)
+        if parameters.mode == "weights" and not inside.all():
+            raise InputError(
+                f"frame {rows.frames[~inside][0]} is edited but lies outside the window from {first} to {last}",
+                remedy='widen the window, or let the bases change too (mode "both")',
+            )
+        responses = self._respond(rows) if parameters.mode != "weights" else None
+        # Constraints in units of the median edge; weights in units of what they move, evened out over the window.
+        lambda_e = parameters.lambda_e / self._edge**2
+        lambda_w = parameters.lambda_w * (self._reach / self._edge) ** 2 * n / 4
+        time = lambda_w * time_matrix(n, first > 0, last < take.n_frames - 1, parameters.smoothness)
+        gram = None if not len(rows.held) else lambda_e * rows.held_weight * self._held_gram(rows.held)
+        moves = np.einsum("au,kuc->akc", rows.combination, take.moves_at(rows.vertices))
+        coupling = np.zeros((len(rows), len(rows)))
+        if responses is not None:
+            coupling = rows.combination @ responses[rows.vertices] @ rows.combination.T
+        return _Problem(
+            rows=rows,
+            moves=moves,
+            coupling=coupling,
+            responses=responses,
+            original=take.weights,
+            first=first,
+            inside=inside,
+            weights=WeightsProblem(time, gram, -take.weights[first : last + 1]),
+            lambda_b=parameters.lambda_b,
+            lambda_e=lambda_e,
+        )
+
+    def _respond(self, rows: ConstraintRows) -> Array:
+        """``Z`` (V, U) for the rows' vertices."""
+        if self._responses is None or not np.array_equal(self._responses.held, rows.held):
+            self._responses = Responses(self.take.system, rows.held)
+        return self._responses(rows.vertices)
+
+    def _held_gram(self, held: NDArray[np.int64]) -> Array:
+        """Inner products of the bases' displacements over the held vertices, ``(K, K)``."""
+        if self._gram is None or not np.array_equal(self._gram[0], held):
+            moved = self.take.moves_at(held).reshape(self.take.n_bases, -1)
+            self._gram = (held, moved @ moved.T)
+        return self._gram[1]
+
+    def _result(
+        self,
+        constraints: Sequence[Constraint],
+        rows: ConstraintRows,
+        problem: _Problem,
+        state: _State,
+        energies: list[float],
+    ) -> PoseEdit:
+        last = problem.first + len(state.change) - 1
+        weights = self.take.weights.copy()
+        weights[problem.first : last + 1] = np.maximum(weights[problem.first : last + 1] + state.change, 0)
+        moves = None
+        if problem.responses is not None:
+            small = np.einsum("au,akc->ukc", rows.combination, state.row_moves)
+            moves = LowRankMoves(problem.responses, small)
+        left = np.sqrt(np.sum(problem.residual(state) ** 2, axis=1))
+        asked = np.sqrt(np.sum(problem.misfit(problem.original[rows.frames]) ** 2, axis=1))
+        residuals = []
+        for index, constraint in enumerate(constraints):
+            mine = rows.owners == index
+            if isinstance(constraint, FixedConstraint) and constraint.frames is None:
+                residuals.append(Residual(constraint, self._held_motion(constraint, state.change), 0.0))
+            else:
+                residuals.append(
+                    Residual(constraint, float(left[mine].max(initial=0)), float(asked[mine].max(initial=0)))
+                )
+        return PoseEdit(self.take, weights, moves, (problem.first, last), tuple(residuals), tuple(energies))
+
+    def _held_motion(self, constraint: FixedConstraint, change: Array) -> float:
+        ids = np.asarray(constraint.vertices, dtype=np.int64)
+        moved = self.take.moves_at(ids).reshape(self.take.n_bases, -1)
+        squared = np.einsum("tk,kl,tl->t", change, moved @ moved.T, change)
+        return float(np.sqrt(max(float(squared.max(initial=0)), 0.0) / max(len(ids), 1)))
+
+
+@dataclass(frozen=True)
+class _State:
+    """A change of the weights (n, K) with the bases that suit it best: ``row_moves`` (R, K, 3) their coefficients."""
+
+    change: Array
+    row_moves: Array
+    energy: float
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Everything that stays the same over the rounds; ``moves`` (R, K, 3) are the bases' displacements at the rows."""
+
+    rows: ConstraintRows
+    moves: Array
+    coupling: Array
+    responses: Array | None
+    original: Array
+    first: int
+    inside: NDArray[np.bool_]
+    weights: WeightsProblem
+    lambda_b: float
+    lambda_e: float
+
+    def weights_at(self, change: Array) -> Array:
+        """The edited weights in each row's frame, ``(R, K)``."""
+        weights = self.original[self.rows.frames].copy()
+        weights[self.inside] += change[self.rows.frames[self.inside] - self.first]
+        return weights
+
+    def misfit(self, weights_at: Array) -> Array:
+        """What the rows still ask for with these weights and the unedited bases, ``(R, 3)``."""
+        return np.asarray(self.rows.goals - np.einsum("ak,akc->ac", weights_at, self.moves))
+
+    def metric(self, weights_at: Array, coupled: bool = True) -> Array:
+        """``M`` (R, R)."""
+        coupling = self.coupling if coupled else np.zeros_like(self.coupling)
+        return bases_metric(weights_at, coupling, self.rows.weights, self.lambda_b, self.lambda_e)
+
+    def moves_with(self, row_moves: Array) -> Array:
+        """The edited bases' displacements at the rows, ``(R, K, 3)``."""
+        return np.asarray(self.moves + np.einsum("ab,bkc->akc", self.coupling, row_moves))
+
+    def residual(self, state: _State) -> Array:
+        """What the rows still ask for after the edit, ``(R, 3)``."""
+        weights_at = self.weights_at(state.change)
+        return np.asarray(self.rows.goals - np.einsum("ak,akc->ac", weights_at, self.moves_with(state.row_moves)))
+
+    def with_bases(self, change: Array) -> _State:
+        """The bases step: the best bases for a change of the weights."""
+        weights_at = self.weights_at(change)
+        misfit = self.misfit(weights_at)
+        pull = np.linalg.solve(self.metric(weights_at), misfit)
+        row_moves = np.zeros_like(self.moves)
+        if self.responses is not None:
+            row_moves = weights_at[:, :, None] * pull[:, None, :] / self.lambda_b
+        energy = float(np.sum(misfit * pull)) + self.weights.cost(change)
+        return _State(change, row_moves, energy)
+
+    def better_weights(self, state: _State, coupled: bool) -> Array:
+        """The weights step, ``(n, K)``."""
+        n, n_bases = state.change.shape
+        weights_at, moves = self.weights_at(state.change), self.moves_with(state.row_moves)
+        local = np.zeros((len(self.rows), 3, n, n_bases))
+        at = np.flatnonzero(self.inside)
+        local[at, :, self.rows.frames[at] - self.first] = moves[at].transpose(0, 2, 1)
+        now = np.einsum("ak,akc->ac", weights_at - self.original[self.rows.frames], moves)
+        left = self.misfit(weights_at) if coupled else self.residual(state)
+        metric: Array = np.kron(self.metric(weights_at, coupled), np.eye(3)).astype(np.float64)
+        return self.weights.solve(local.reshape(-1, n, n_bases), (left + now).ravel(), metric, state.change)
+
+
+def _iterate(
+    problem: _Problem, change: Array, parameters: EditParameters, progress: Progress
+) -> tuple[_State, list[float]]:
+    """Rounds until one gains less than the tolerance; the energy never rises."""
+    state = problem.with_bases(change)
+    energies = [state.energy]
+    if parameters.mode == "bases":
+        return problem.with_bases(np.zeros_like(change)), energies
+    for done in range(parameters.most_rounds):
+        progress("solving the edit", done, parameters.most_rounds)
+        step = problem.better_weights(state, parameters.coupled) - state.change
+        trial = problem.with_bases(state.change + step)
+        for _ in range(_MOST_HALVINGS):
+            if trial.energy <= state.energy:
+                break
+            step = step / 2
+            trial = problem.with_bases(state.change + step)
+        gain = state.energy - trial.energy
+        if gain > 0:
+            state = trial
+        energies.append(state.energy)
+        if gain <= parameters.tolerance * state.energy:
+            break
+    progress("solving the edit", parameters.most_rounds, parameters.most_rounds)
+    return state, energies
+
+
+def _reach(take: EditableTake) -> float:
+    """How far the bases move the face: root mean square over the bases of the largest displacement."""
+    squared = [float(np.einsum("vc,vc->v", move, move).max(initial=0)) for move in take.moves]
+    return max(float(np.sqrt(np.mean(squared))) if squared else 0.0, 1e-12 * float(np.abs(take.rest).max(initial=1)))
