@@ -17,7 +17,7 @@ from toolkit.pose_edit import (
     PoseEditor,
 )
 from toolkit.pose_edit.constraints import rows_of
-from toolkit.pose_edit.weights_step import WeightsProblem, time_matrix
+from toolkit.pose_edit.weights_step import FrameRows, WeightsProblem, time_matrix
 
 KEY, TWIN = 18, 51  # frames of a similar expression in `face`
 
@@ -154,11 +154,12 @@ def test_the_weights_step_equals_a_dense_bounded_solve(with_gram: bool) -> None:
         time = time_matrix(n, *tied, smoothness=1.5)
         half = rng.normal(size=(k, k))
         problem = WeightsProblem(time, half @ half.T if with_gram else None, -rng.uniform(0, 0.3, (n, k)))
+        seen = FrameRows(np.array([3, 3, 8, 8]), rng.normal(size=(r, k)))
         rows = np.zeros((r, n, k))
-        rows[:, [3, 8]] = rng.normal(size=(r, 2, k))
+        rows[np.arange(r), seen.frames] = seen.local
         goals = 3 * rng.normal(size=r)
         root = rng.normal(size=(r, r)) + 3 * np.eye(r)
-        found = problem.solve(rows, goals, np.linalg.inv(root.T @ root), np.zeros((n, k)))
+        found = problem.solve(seen, goals, np.linalg.inv(root.T @ root), np.zeros((n, k)))
         blocks = [np.kron(np.linalg.cholesky(time.toarray()).T, np.eye(k)), root @ rows.reshape(r, -1)]
         if with_gram:
             blocks.append(np.kron(np.eye(n), half.T))

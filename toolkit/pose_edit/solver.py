@@ -22,7 +22,7 @@ from toolkit.pose_edit.constraints import Constraint, ConstraintRows, FixedConst
 from toolkit.pose_edit.parameters import EditParameters
 from toolkit.pose_edit.result import PoseEdit, Residual
 from toolkit.pose_edit.take import EditableTake, LowRankMoves
-from toolkit.pose_edit.weights_step import WeightsProblem, time_matrix
+from toolkit.pose_edit.weights_step import FrameRows, WeightsProblem, time_matrix
 from toolkit.progress import Progress, silent
 
 __all__ = ["PoseEditor"]
@@ -221,15 +221,15 @@ class _Problem:
 
     def better_weights(self, state: _State, coupled: bool) -> Array:
         """The weights step, ``(n, K)``."""
-        n, n_bases = state.change.shape
         weights_at, moves = self.weights_at(state.change), self.moves_with(state.row_moves)
-        local = np.zeros((len(self.rows), 3, n, n_bases))
-        at = np.flatnonzero(self.inside)
-        local[at, :, self.rows.frames[at] - self.first] = moves[at].transpose(0, 2, 1)
+        # Rows outside the window see no change of weights, yet pull on the bases with the others.
+        frames = np.where(self.inside, self.rows.frames - self.first, 0)
+        local = np.where(self.inside[:, None, None], moves, 0.0).transpose(0, 2, 1).reshape(-1, moves.shape[1])
+        rows = FrameRows(np.repeat(frames, 3), local)
         now = np.einsum("ak,akc->ac", weights_at - self.original[self.rows.frames], moves)
         left = self.misfit(weights_at) if coupled else self.residual(state)
         metric: Array = np.kron(self.metric(weights_at, coupled), np.eye(3)).astype(np.float64)
-        return self.weights.solve(local.reshape(-1, n, n_bases), (left + now).ravel(), metric, state.change)
+        return self.weights.solve(rows, (left + now).ravel(), metric, state.change)
 
 
 def _iterate(

@@ -5,9 +5,9 @@ With ``u = w' - w`` the change of the weights, ``(n, K)`` over the window's n fr
     min_u  sum_k u_k^T Q u_k + sum_t u_t^T G u_t + (r - B u)^T M^-1 (r - B u),    u >= -w
 
 ``Q`` holds what changes in time cost, ``G`` what moving the fixed vertices costs, ``B`` how the few constrained frames
-answer. Solved by a primal-dual active set method: with the set of weights that are zero given, what is left is banded
-(plus the few rows of ``B``, by Woodbury's formula); the set is then corrected all at once, and rarely needs more than
-ten corrections, fewer still when it starts from the last edit's.
+answer. A primal-dual interior point method (Mehrotra's): each of its 15 to 20 steps is one banded factorisation, the
+few rows of ``B`` by Woodbury's formula. Active sets alone creep here, since a curve that bends slowly leaves zero one
+frame at a time; they only finish: weights that the interior point leaves next to zero become exactly zero.
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-__all__ = ["WeightsProblem", "time_matrix"]
+__all__ = ["FrameRows", "WeightsProblem", "time_matrix"]
 
 Array = NDArray[np.float64]
 
-_MOST_CORRECTIONS = 60
-# Corrections that may fail to improve before only one weight is exchanged at a time (Judice and Pires).
-_PATIENCE = 8
+_MOST_STEPS = 60
+_MOST_CORRECTIONS = 4
+# Complementarity, as a share of its start, at which the interior point stops.
+_CLOSE = 1e-10
 
 
 def time_matrix(n: int, tied_before: bool, tied_after: bool, smoothness: float) -> sp.csr_matrix:
@@ -45,6 +46,24 @@ def time_matrix(n: int, tied_before: bool, tied_after: bool, smoothness: float) 
 
 
 @dataclass(frozen=True)
+class FrameRows:
+    """``B``: row a sees only frame ``frames[a]`` of the window, ``(B u)_a = local[a] . u[frames[a]]``, local (R, K)."""
+
+    frames: NDArray[np.int64]
+    local: Array
+
+    def of(self, change: Array) -> Array:
+        """``B u`` (R,)."""
+        return np.asarray(np.einsum("ak,ak->a", self.local, change[self.frames]))
+
+    def spread(self, values: Array, like: Array) -> Array:
+        """``B^T values`` (n, K)."""
+        result = np.zeros_like(like)
+        np.add.at(result, self.frames, values[:, None] * self.local)
+        return result
+
+
+@dataclass(frozen=True)
 class WeightsProblem:
     """What stays the same: ``time`` = Q (n, n), five bands, ``gram`` = G (K, K) or None, ``lower`` = -w (n, K)."""
 
@@ -61,83 +80,145 @@ class WeightsProblem:
         force = np.asarray(self.time @ change)
         return force if self.gram is None else force + change @ self.gram
 
-    def solve(self, rows: Array, goals: Array, metric: Array, start: Array) -> Array:
-        """The best change (n, K) for rows ``B`` (R, n, K), goals ``r`` (R,) and metric ``M`` (R, R).
+    def solve(self, rows: FrameRows, goals: Array, metric: Array, start: Array) -> Array:
+        """The best change (n, K) for goals ``r`` (R,) and metric ``M`` (R, R), beginning near ``start`` (n, K)."""
+        gradient = _Gradient(self, rows, goals, metric)
+        change, force = self._interior_point(gradient, start)
+        active = change - self.lower < force / max(float(np.abs(self.time.diagonal()).max()), 1e-300)
+        return self._finish(gradient, active, change)
 
-        ``start`` (n, K) is an earlier solution: the weights that it makes zero are the first guess.
-        """
-        lower = self.lower
-        active = start <= lower
-        size = max(float(np.abs(lower).max(initial=0)), 1e-12)
-        fewest, patience = active.size + 1, _PATIENCE
-        change = start
-        for _ in range(_MOST_CORRECTIONS):
-            change, pull = self._with_active(active, rows, goals, metric)
-            force = self.force(change) - np.tensordot(pull, rows, axes=1)
-            tolerance = 1e-9 * max(float(np.abs(force[active]).max(initial=0)), 1e-300)
-            below = ~active & (change < lower - 1e-12 * size)
-            wanting = active & (force < -tolerance)
-            wrong = below | wanting
-            count = int(wrong.sum())
-            if count == 0:
+    def _interior_point(self, gradient: _Gradient, start: Array) -> tuple[Array, Array]:
+        """A change just inside the bounds, and the force that each bound takes."""
+        slack = np.maximum(start - self.lower, 1e-2 * max(float(-self.lower.min(initial=0)), 1.0))
+        change = self.lower + slack
+        slope = gradient(change)
+        force = np.maximum(slope, 0) + max(float(np.abs(slope).mean()), 1e-300)
+        goal = _CLOSE * float(np.mean(slack * force))
+        for _ in range(_MOST_STEPS):
+            gap = float(np.mean(slack * force))
+            if gap <= goal:
                 break
-            if count < fewest:
-                fewest, patience = count, _PATIENCE
-            elif patience > 0:
-                patience -= 1
-            else:
-                wrong = np.zeros_like(wrong)
-                wrong.flat[np.flatnonzero(below | wanting)[-1]] = True
+            system = gradient.factorise(force / slack)
+            rest = gradient(change) - force
+            move = system.solve(-rest - force)
+            push = -force - force * move / slack
+            length = min(_longest(slack, move), _longest(force, push))
+            ahead = float(np.mean((slack + length * move) * (force + length * push)))
+            centre = gap * (ahead / gap) ** 3
+            # Second order: what the first step would leave of slack times force.
+            short = (centre - move * push) / slack
+            move = system.solve(-rest - force + short)
+            push = short - force - force * move / slack
+            length = 0.995 * min(_longest(slack, move), _longest(force, push))
+            slack, force = slack + length * move, force + length * push
+            change = self.lower + slack
+        return change, force
+
+    def _finish(self, gradient: _Gradient, active: NDArray[np.bool_], near: Array) -> Array:
+        """The exact solution for the weights that are at zero, these corrected once or twice."""
+        best, least = np.where(active, self.lower, near), gradient.energy(near)
+        for _ in range(_MOST_CORRECTIONS):
+            bound = np.where(active, self.lower, 0.0)
+            change = bound + gradient.factorise(np.where(active, np.inf, 0.0)).solve(-gradient(bound))
+            slope = gradient(change)
+            wrong = (~active & (change < self.lower)) | (active & (slope < 0))
+            if not wrong.any():
+                break
             active = active ^ wrong
-        return np.maximum(change, lower)
+        change = np.maximum(change, self.lower)
+        return change if gradient.energy(change) <= least else best
 
-    def _with_active(self, active: NDArray[np.bool_], rows: Array, goals: Array, metric: Array) -> tuple[Array, Array]:
-        """The solution with the active weights at their bound, and ``M^-1 (r - B u)``."""
-        bound = np.where(active, self.lower, 0.0)
-        right = -self.force(bound)
-        right[active] = 0
-        open_rows = np.where(active, 0.0, rows)
-        left = goals - np.tensordot(rows, bound, axes=2)
-        solved = self._solve_banded(active, np.concatenate([right[None], open_rows]))
-        answer = np.tensordot(open_rows, solved, axes=([1, 2], [1, 2]))  # (R, 1 + R)
-        pull = np.linalg.solve(metric + answer[:, 1:], left - answer[:, 0]) if len(goals) else left
-        return bound + solved[0] + np.tensordot(pull, solved[1:], axes=1), pull
 
-    def _solve_banded(self, active: NDArray[np.bool_], right: Array) -> Array:
-        """Solve on the free weights for right-hand sides (R, n, K), zero at the active ones."""
-        n, n_bases = active.shape
-        bands = [np.zeros(n) for _ in range(3)]
-        for offset in range(min(3, n)):
-            bands[offset][: n - offset] = self.time.diagonal(offset)
-        if self.gram is None:
-            # Without fixed vertices each weight's curve is a chain of its own: five bands in all.
-            free = ~active.T.ravel()
-            matrix = np.stack([np.tile(band, n_bases) for band in bands])
-            columns = right.transpose(2, 1, 0).reshape(n * n_bases, -1)
-        else:
-            free = ~active.ravel()
-            matrix = _frame_bands(bands, self.gram, n)
-            columns = right.transpose(1, 2, 0).reshape(n * n_bases, -1)
-        for offset in range(len(matrix)):
+class _Gradient:
+    """Half the gradient of the energy, ``P u - B^T M^-1 (r - B u)``, and its linear systems."""
+
+    def __init__(self, problem: WeightsProblem, rows: FrameRows, goals: Array, metric: Array) -> None:
+        self.problem, self.rows, self.goals, self.metric = problem, rows, goals, metric
+
+    def __call__(self, change: Array) -> Array:
+        pull = _solved(self.metric, self.goals - self.rows.of(change))
+        return self.problem.force(change) - self.rows.spread(pull, change)
+
+    def energy(self, change: Array) -> float:
+        """What is minimised."""
+        left = self.goals - self.rows.of(change)
+        return self.problem.cost(change) + float(left @ _solved(self.metric, left))
+
+    def factorise(self, extra: Array) -> _System:
+        """``P + diag(extra) + B^T M^-1 B``, extra (n, K); infinite where a weight cannot move."""
+        return _System(self.problem, self.rows, self.metric, extra)
+
+
+class _System:
+    """The banded part factorised, the rows by Woodbury's formula."""
+
+    def __init__(self, problem: WeightsProblem, rows: FrameRows, metric: Array, extra: Array) -> None:
+        stuck = np.isinf(extra)
+        self._open, self._by_basis = ~stuck, problem.gram is None
+        self._shape = extra.shape
+        self._rows = FrameRows(rows.frames, np.where(stuck[rows.frames], 0.0, rows.local))
+        free = self._flat(self._open)
+        bands = _bands(problem, len(extra))
+        bands[0] += np.where(free, self._flat(np.where(stuck, 0.0, extra)), 0.0)
+        for offset in range(len(bands)):
             length = max(len(free) - offset, 0)
-            matrix[offset, :length] *= free[:length] & free[len(free) - length :]
-            matrix[offset, length:] = 0
-        matrix[0, ~free] = 1
-        factor = cholesky_banded(matrix, overwrite_ab=True, lower=True, check_finite=False)
-        solved = cho_solve_banded((factor, True), columns, check_finite=False)
-        if self.gram is None:
-            return np.asarray(solved.reshape(n_bases, n, -1).transpose(2, 1, 0))
-        return np.asarray(solved.reshape(n, n_bases, -1).transpose(2, 0, 1))
+            bands[offset, :length] *= free[:length] & free[len(free) - length :]
+        bands[0, ~free] = 1
+        self._factor = cholesky_banded(bands, overwrite_ab=True, lower=True, check_finite=False)
+        self._small = metric + self._answers()
+
+    def solve(self, right: Array) -> Array:
+        """Solve for one right-hand side (n, K); what cannot move stays zero."""
+        alone = self._banded(np.where(self._open, right, 0.0))
+        pull = _solved(self._small, self._rows.of(alone))
+        return alone - self._banded(self._rows.spread(pull, alone))
+
+    def _answers(self) -> Array:
+        """``B P^-1 B^T`` (R, R)."""
+        rows, (n, n_bases) = self._rows, self._shape
+        if self._by_basis:
+            frames, at = np.unique(rows.frames, return_inverse=True)
+            units = np.zeros((n_bases, n, len(frames)))
+            units[:, frames, np.arange(len(frames))] = 1
+            solved = cho_solve_banded((self._factor, True), units.reshape(-1, len(frames)), check_finite=False)
+            between = solved.reshape(n_bases, n, -1)[:, frames][:, at][:, :, at]  # (K, R, R)
+            return np.asarray(np.einsum("ak,kab,bk->ab", rows.local, between, rows.local))
+        pulls = np.zeros((n, n_bases, len(rows.frames)))
+        pulls[rows.frames, :, np.arange(len(rows.frames))] = rows.local
+        solved = cho_solve_banded((self._factor, True), pulls.reshape(n * n_bases, -1), check_finite=False)
+        return np.asarray(np.einsum("ak,akb->ab", rows.local, solved.reshape(n, n_bases, -1)[rows.frames]))
+
+    def _banded(self, right: Array) -> Array:
+        solved = cho_solve_banded((self._factor, True), self._flat(right), check_finite=False)
+        return np.asarray(solved.reshape(self._shape[::-1]).T if self._by_basis else solved.reshape(self._shape))
+
+    def _flat(self, array: NDArray) -> NDArray:
+        return array.T.ravel() if self._by_basis else array.ravel()
 
 
-def _frame_bands(bands: list[Array], gram: Array, n: int) -> Array:
-    """Frame by frame: the fixed vertices couple the weights of a frame, time couples a frame with the next two."""
-    n_bases = len(gram)
-    matrix = np.zeros((2 * n_bases + 1, n * n_bases))
+def _bands(problem: WeightsProblem, n: int) -> Array:
+    """Lower bands of ``P``.
+
+    Without fixed vertices each weight's curve is a chain of its own, so basis by basis: three bands. With them, frame
+    by frame: the fixed vertices couple the weights of a frame, time couples a frame with the next two.
+    """
+    n_bases = problem.lower.shape[1]
+    time = [np.pad(problem.time.diagonal(offset), (0, min(offset, n))) for offset in range(3)]
+    if problem.gram is None:
+        return np.stack([np.tile(band, n_bases) for band in time])
+    bands = np.zeros((2 * n_bases + 1, n * n_bases))
     for offset in range(n_bases):
-        within = np.zeros(n_bases)
-        within[: n_bases - offset] = np.diagonal(gram, offset)
-        matrix[offset] = np.tile(within, n)
-    for step, band in enumerate(bands):
-        matrix[step * n_bases] += np.repeat(band, n_bases)
-    return matrix
+        bands[offset] = np.tile(np.pad(np.diagonal(problem.gram, offset), (0, offset)), n)
+    for step, band in enumerate(time):
+        bands[step * n_bases] += np.repeat(band, n_bases)
+    return bands
+
+
+def _solved(matrix: Array, right: Array) -> Array:
+    return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+
+
+def _longest(values: Array, step: Array) -> float:
+    """The longest step, at most 1, that keeps the values from falling below zero."""
+    falling = step < 0
+    return min(1.0, float((-values[falling] / step[falling]).min(initial=np.inf)))
