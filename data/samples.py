@@ -44,15 +44,16 @@ class PerformerPaths:
 class TargetPaths:
     """One target's files.
 
-    ``reference`` PLY; ``truth`` .npz, read by ``Truth.load``; ``landmarks`` (48 pairs), ``landmarks_30`` and
-    ``feature_lines`` JSON in the shot folder's format, with ``target_vertices`` added to each line; ``eyes``
-    PLY of the eyeballs, for pictures.
+    ``reference`` PLY; ``truth`` .npz, read by ``Truth.load``; ``landmarks`` (48 pairs on the face), ``landmarks_30``,
+    ``landmarks_head`` (the 48, ears, skull and neck) and ``feature_lines`` JSON in the shot folder's format, with
+    ``target_vertices`` added to each line; ``eyes`` PLY of the eyeballs, for pictures.
     """
 
     reference: Path
     truth: Path
     landmarks: Path
     landmarks_30: Path
+    landmarks_head: Path
     feature_lines: Path
     eyes: Path
 
@@ -165,6 +166,7 @@ def _paths(root: Path, targets: Sequence[str]) -> SamplePaths:
             truth=folder / "truth.npz",
             landmarks=folder / "landmarks.json",
             landmarks_30=folder / "landmarks_30.json",
+            landmarks_head=folder / "landmarks_head.json",
             feature_lines=folder / "feature_lines.json",
             eyes=folder / "eyes.ply",
         )

@@ -34,12 +34,12 @@ def main(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     for name, shot in zip(TARGETS, shots, strict=True):
         target, performer = samples.targets[name], samples.performer
         inputs = ["--source-reference", performer.reference, "--frames", performer.frames, "--fps", performer.fps]
-        inputs += ["--target", target.reference, "--landmarks", target.landmarks]
+        inputs += ["--target", target.reference, "--landmarks", target.landmarks_head]
         _command("new_shot.py", shot, "--force", *inputs, "--feature-lines", target.feature_lines)
         _command("run_all.py", shot)
         _command("7_export.py", shot, "--format", "gltf", "--out", out / f"{name}.glb")
         _command("report.py", shot, "--out", out / f"report_{name}.html")
-    _command("render.py", *shots, "--out", out, "--video", "--every", 1 if options.level > 1 else 4)
+    _command("render.py", *shots, "--out", out, "--video", "--height", 440)
     shutil.copyfile(out / "performance.mp4", out / "side_by_side.mp4")
     (out / "performance.mp4").unlink()
     seconds = time.perf_counter() - began

@@ -75,7 +75,7 @@ def test_landmarks_and_lines_name_the_same_places_on_both_faces(coarse):
         vertices, triangles = read_ply(paths.reference)
         truth = coarse.truth(name).shape(np.zeros(52))
         size = np.ptp(vertices, axis=0).max()
-        for file, count in ((paths.landmarks, 48), (paths.landmarks_30, 30)):
+        for file, count in ((paths.landmarks, 48), (paths.landmarks_30, 30), (paths.landmarks_head, 58)):
             pairs = json.loads(file.read_text())["pairs"]
             assert len({pair["target"] for pair in pairs}) == count
             source, target = (np.array([pair[side] for pair in pairs]) for side in ("source", "target"))
