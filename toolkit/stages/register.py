@@ -24,6 +24,7 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     if same_topology(source, target):
         vertices, distance = target.vertices, np.zeros(source.n_vertices)
         interior = np.zeros(source.n_vertices, dtype=bool)
+        flipped, wrong_sheet = np.zeros(source.n_triangles, dtype=bool), interior
         folder.numbers["method"] = "none: the target is on the source's topology"
     elif not len(landmarks.names):
         raise InputError(
@@ -34,10 +35,13 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     else:
         result = register(source, target, landmarks, load_lines(shot), shot.config.register, progress)
         vertices, distance, interior = result.vertices, result.distance, result.interior
-        folder.numbers |= asdict(result.quality)
+        flipped, wrong_sheet = result.flipped, result.wrong_sheet
+        folder.numbers |= asdict(result.quality) | {"warnings": list(result.warnings)}
     folder.save("target_vertices", vertices)
     folder.save("distance", distance)
     folder.save("interior", interior)
+    folder.save("flipped", flipped)
+    folder.save("wrong_sheet", wrong_sheet)
     skin = ~interior
     pose = umeyama(source.vertices[skin], vertices[skin])
     folder.save("pose", np.concatenate([[pose.scale], pose.rotation.ravel(), pose.translation]))
