@@ -43,14 +43,14 @@ def decimate(mesh: TriangleMesh, n_vertices: int) -> Coarse:
 
 
 def _barycentric_rows(points: Array, coarse: TriangleMesh, landed: NDArray[np.int64]) -> sp.csr_matrix:
-    """For each fine point the nearest point among the triangles within two edges of ``landed`` (V,)."""
+    """For each fine point the nearest point among the triangles round the vertex ``landed`` (V,)."""
     n, corners = coarse.n_vertices, coarse.triangles
     n_triangles = coarse.n_triangles
     incidence = sp.csr_matrix(
         (np.ones(3 * n_triangles, dtype=np.int8), (corners.ravel(), np.repeat(np.arange(n_triangles), 3))),
         shape=(n, n_triangles),
     )
-    near = ((incidence @ incidence.T).astype(bool).astype(np.int8) @ incidence).tocsr()
+    near = incidence.tocsr()
     best = np.full(len(points), np.inf)
     triangle, weights = np.zeros(len(points), dtype=np.int64), np.tile([1.0, 0.0, 0.0], (len(points), 1))
     counts = np.diff(near.indptr)[landed]

@@ -20,7 +20,7 @@ from toolkit.registration.coarse import Coarse, decimate
 from toolkit.registration.consistency import check_landmarks, misfit
 from toolkit.registration.curves import Curve, match_lines, opposite_sheets, rim_loops, sheet_labels
 from toolkit.registration.finish import follow, project, smooth_field, unfold
-from toolkit.registration.interior import find_interior
+from toolkit.registration.interior import all_openings, behind_loops, find_interior, minor_components
 from toolkit.registration.landmarks import Landmarks
 from toolkit.registration.nonrigid import SheetedSurface, solve_field
 from toolkit.registration.parameters import RegistrationParameters
@@ -147,7 +147,10 @@ class _Job:
         posed = ThinPlateSpline(near[landmarks.source], points, _SPLINE_SMOOTHING * alike * extent)(near)
         curves = match_lines(lines, source, target, posed)
         loops, target_loops = rim_loops(lines, source, curves)
-        skin, target_skin = ~find_interior(source, loops), ~find_interior(target, target_loops)
+        skin = ~find_interior(source, loops)
+        # The same sign on both sides: skin that one side calls hidden would look for its place elsewhere.
+        hidden = minor_components(target) | behind_loops(target, target_loops)
+        target_skin = ~hidden if all_openings(loops) else ~find_interior(target, target_loops)
         labels = sheet_labels(source, skin, curves, on_target=False)
         return cls(
             source=source,

@@ -11,18 +11,19 @@ from scipy.sparse.csgraph import connected_components
 
 from toolkit.mesh import TriangleMesh, vertex_adjacency, vertex_areas, vertex_normals
 
-__all__ = ["behind_loops", "exposure", "find_interior", "minor_components"]
+__all__ = ["all_openings", "behind_loops", "exposure", "find_interior", "minor_components"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_RAYS = 96
+_RAYS = 64
 _HIDDEN = 0.20
 """Share of the sky, weighted by the cosine, below which a point counts as hidden. The mouth bag and the sockets see
 0 to 0.17, lids and the corners of the eyes 0.4 and more; nostrils and the lips' contact are hidden too, and follow."""
 
 
 _LEAST_PATCH = 1e-3
+_ALL_OPENINGS = 3
 
 
 def find_interior(mesh: TriangleMesh, loops: Sequence[NDArray[np.integer]] = ()) -> Mask:
@@ -34,15 +35,16 @@ def find_interior(mesh: TriangleMesh, loops: Sequence[NDArray[np.integer]] = ())
     loops : closed rings of vertex ids (consecutive ones joined by edges) round openings: inner lip line, lid rims.
         Everything that they cut off from the largest part is interior; the ring itself is skin.
 
-    Three signs, any of which suffices: another connected component than the largest; cut off by a loop; hidden, that
-    is, sees less than 20 % of the sky. Where loops are given they say it better than light does: hidden patches that
-    touch one, or what it cuts off, are not taken (lips in contact are skin).
+    Three signs: another connected component than the largest; cut off by a loop; and, where fewer than three loops
+    (the mouth and two eyes) say so, hidden, that is, seeing less than 20 % of the sky.
     """
-    cut = behind_loops(mesh, loops)
-    claimed = cut.copy()
-    for loop in loops:
-        claimed[np.asarray(loop)] = True
-    return minor_components(mesh) | cut | _hidden(mesh, claimed)
+    known = minor_components(mesh) | behind_loops(mesh, loops)
+    return known if all_openings(loops) else known | _hidden(mesh, loops)
+
+
+def all_openings(loops: Sequence[NDArray[np.integer]]) -> bool:
+    """Whether the rims of the mouth and of both eyes are among the loops, as far as their number tells."""
+    return len(loops) >= _ALL_OPENINGS
 
 
 def minor_components(mesh: TriangleMesh) -> Mask:
@@ -86,8 +88,11 @@ def exposure(mesh: TriangleMesh, n_rays: int = _RAYS) -> Array:
     return seen / np.maximum(whole, 1e-12)
 
 
-def _hidden(mesh: TriangleMesh, claimed: Mask) -> Mask:
-    """Patches of hidden vertices, speckles smoothed away, that are not tiny and touch nothing ``claimed``."""
+def _hidden(mesh: TriangleMesh, loops: Sequence[NDArray[np.integer]]) -> Mask:
+    """Patches of hidden vertices, speckles smoothed away, that are not tiny and touch no loop.
+
+    Where there is a loop it says better what is skin: lips in contact are, though they see nothing.
+    """
     adjacency = vertex_adjacency(mesh.triangles, mesh.n_vertices)
     degree = np.maximum(np.asarray(adjacency.sum(axis=1)).ravel(), 1)
     mask = (exposure(mesh) < _HIDDEN).astype(float)
@@ -97,7 +102,8 @@ def _hidden(mesh: TriangleMesh, claimed: Mask) -> Mask:
     count, labels = connected_components(sp.csr_matrix(inside @ adjacency @ inside), directed=False)
     share = np.bincount(labels, weights=np.where(hidden, areas, 0.0)) / max(areas.sum(), 1e-300)
     touched = np.zeros(count, dtype=bool)
-    touched[labels[claimed & hidden]] = True
+    for loop in loops:
+        touched[labels[np.asarray(loop)]] = True
     return hidden & (share[labels] > _LEAST_PATCH) & ~touched[labels]
 
 
