@@ -82,7 +82,7 @@ def register(
     """Bring the source's topology into the target's shape (the paper's preprocessing; its section 3).
 
     Similarity and thin-plate spline through the landmarks, then a smooth displacement field on a decimated source
-    with closest points, then the skin onto the target's surface. See ``design/method.md``, section 2.
+    with closest points, then the skin onto the target's surface. See ``docs/method.md``, section 2.
 
     Parameters
     ----------
