@@ -19,7 +19,7 @@ NEEDED_LANDMARKS = 6
 """A spline in space needs four, not in one plane; two more tell a wrong one."""
 
 ADVISED_LANDMARKS = 30
-"""Below this the registration's error grows quickly (design: 40 to 50 are wanted)."""
+"""Below this the registration's error grows quickly; 40 to 50 are better still."""
 
 
 CLOSED = '"closed": true'
