@@ -243,20 +243,30 @@ def _iterate(
     for done in range(parameters.most_rounds):
         progress("solving the edit", done, parameters.most_rounds)
         step = problem.better_weights(state, parameters.coupled) - state.change
-        trial = problem.with_bases(state.change + step)
-        for _ in range(_MOST_HALVINGS):
-            if trial.energy <= state.energy:
-                break
-            step = step / 2
-            trial = problem.with_bases(state.change + step)
-        gain = state.energy - trial.energy
-        if gain > 0:
-            state = trial
+        better = _along(problem, state, step)
+        gain = state.energy - better.energy
+        state = better
         energies.append(state.energy)
         if gain <= parameters.tolerance * state.energy:
             break
     progress("solving the edit", parameters.most_rounds, parameters.most_rounds)
     return state, energies
+
+
+def _along(problem: _Problem, state: _State, step: Array) -> _State:
+    """The best of the step and its halves; the state itself if none is better.
+
+    The constraints are products of weights and bases, so a whole step may go too far. A trial costs next to nothing.
+    """
+    best = state
+    for _ in range(_MOST_HALVINGS):
+        trial = problem.with_bases(state.change + step)
+        if trial.energy < best.energy:
+            best = trial
+        elif best is not state:
+            break
+        step = step / 2
+    return best
 
 
 def _reach(take: EditableTake) -> float:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
@@ -26,7 +27,9 @@ Array = NDArray[np.float64]
 _MOST_STEPS = 60
 _MOST_CORRECTIONS = 4
 # Complementarity, as a share of its start, at which the interior point stops.
-_CLOSE = 1e-10
+_CLOSE = 1e-9
+# How far inside the bounds the interior point begins; weights are of order 1.
+_INSIDE = 1e-2
 
 
 def time_matrix(n: int, tied_before: bool, tied_after: bool, smoothness: float) -> sp.csr_matrix:
@@ -84,16 +87,17 @@ class WeightsProblem:
         """The best change (n, K) for goals ``r`` (R,) and metric ``M`` (R, R), beginning near ``start`` (n, K)."""
         gradient = _Gradient(self, rows, goals, metric)
         change, force = self._interior_point(gradient, start)
-        active = change - self.lower < force / max(float(np.abs(self.time.diagonal()).max()), 1e-300)
+        pulled = float(np.abs(gradient(np.zeros_like(start))).max())
+        active = change - self.lower < force / max(pulled, 1e-300)
         return self._finish(gradient, active, change)
 
     def _interior_point(self, gradient: _Gradient, start: Array) -> tuple[Array, Array]:
         """A change just inside the bounds, and the force that each bound takes."""
-        slack = np.maximum(start - self.lower, 1e-2 * max(float(-self.lower.min(initial=0)), 1.0))
+        slack = np.maximum(start - self.lower, _INSIDE)
         change = self.lower + slack
         slope = gradient(change)
         force = np.maximum(slope, 0) + max(float(np.abs(slope).mean()), 1e-300)
-        goal = _CLOSE * float(np.mean(slack * force))
+        goal = _CLOSE * float(np.mean(np.abs(gradient(np.zeros_like(start)))))
         for _ in range(_MOST_STEPS):
             gap = float(np.mean(slack * force))
             if gap <= goal:
@@ -115,7 +119,7 @@ class WeightsProblem:
         return change, force
 
     def _finish(self, gradient: _Gradient, active: NDArray[np.bool_], near: Array) -> Array:
-        """The exact solution for the weights that are at zero, these corrected once or twice."""
+        """The exact solution with some weights at zero, these corrected a few times; ``near`` if that is better."""
         best, least = np.where(active, self.lower, near), gradient.energy(near)
         for _ in range(_MOST_CORRECTIONS):
             bound = np.where(active, self.lower, 0.0)
@@ -164,7 +168,11 @@ class _System:
             length = max(len(free) - offset, 0)
             bands[offset, :length] *= free[:length] & free[len(free) - length :]
         bands[0, ~free] = 1
-        self._factor = cholesky_banded(bands, overwrite_ab=True, lower=True, check_finite=False)
+        if self._by_basis:
+            _factorise_chains(bands)
+            self._factor = bands
+        else:
+            self._factor = cholesky_banded(bands, overwrite_ab=True, lower=True, check_finite=False)
         self._small = metric + self._answers()
 
     def solve(self, right: Array) -> Array:
@@ -180,17 +188,24 @@ class _System:
             frames, at = np.unique(rows.frames, return_inverse=True)
             units = np.zeros((n_bases, n, len(frames)))
             units[:, frames, np.arange(len(frames))] = 1
-            solved = cho_solve_banded((self._factor, True), units.reshape(-1, len(frames)), check_finite=False)
+            solved = self._substitute(units.reshape(-1, len(frames)))
             between = solved.reshape(n_bases, n, -1)[:, frames][:, at][:, :, at]  # (K, R, R)
             return np.asarray(np.einsum("ak,kab,bk->ab", rows.local, between, rows.local))
         pulls = np.zeros((n, n_bases, len(rows.frames)))
         pulls[rows.frames, :, np.arange(len(rows.frames))] = rows.local
-        solved = cho_solve_banded((self._factor, True), pulls.reshape(n * n_bases, -1), check_finite=False)
+        solved = self._substitute(pulls.reshape(n * n_bases, -1))
         return np.asarray(np.einsum("ak,akb->ab", rows.local, solved.reshape(n, n_bases, -1)[rows.frames]))
 
     def _banded(self, right: Array) -> Array:
-        solved = cho_solve_banded((self._factor, True), self._flat(right), check_finite=False)
+        solved = self._substitute(self._flat(right)[:, None])
         return np.asarray(solved.reshape(self._shape[::-1]).T if self._by_basis else solved.reshape(self._shape))
+
+    def _substitute(self, columns: Array) -> Array:
+        if not self._by_basis:
+            return np.asarray(cho_solve_banded((self._factor, True), columns, check_finite=False))
+        solved = np.array(columns, order="C")
+        _substitute_chains(self._factor, solved)
+        return solved
 
     def _flat(self, array: NDArray) -> NDArray:
         return array.T.ravel() if self._by_basis else array.ravel()
@@ -212,6 +227,40 @@ def _bands(problem: WeightsProblem, n: int) -> Array:
     for step, band in enumerate(time):
         bands[step * n_bases] += np.repeat(band, n_bases)
     return bands
+
+
+@njit(cache=True, nogil=True)
+def _factorise_chains(bands):  # type: ignore[no-untyped-def]  # compiled
+    """``L D L^T`` of five bands, in place: (3, N) becomes D and L's two diagonals. LAPACK is far slower."""
+    diagonal, first, second = bands[0], bands[1], bands[2]
+    for i in range(diagonal.shape[0]):
+        if i >= 2:
+            diagonal[i] -= second[i - 2] ** 2 * diagonal[i - 2]
+        if i >= 1:
+            first[i] -= second[i - 1] * diagonal[i - 1] * first[i - 1]
+            diagonal[i] -= first[i - 1] ** 2 * diagonal[i - 1]
+        first[i] /= diagonal[i]
+        second[i] /= diagonal[i]
+
+
+@njit(cache=True, nogil=True)
+def _substitute_chains(factor, columns):  # type: ignore[no-untyped-def]  # compiled
+    """Solve in place for ``columns`` (N, C)."""
+    diagonal, first, second = factor[0], factor[1], factor[2]
+    n, count = columns.shape
+    for i in range(n):
+        for c in range(count):
+            if i >= 1:
+                columns[i, c] -= first[i - 1] * columns[i - 1, c]
+            if i >= 2:
+                columns[i, c] -= second[i - 2] * columns[i - 2, c]
+    for i in range(n - 1, -1, -1):
+        for c in range(count):
+            columns[i, c] /= diagonal[i]
+            if i + 1 < n:
+                columns[i, c] -= first[i] * columns[i + 1, c]
+            if i + 2 < n:
+                columns[i, c] -= second[i] * columns[i + 2, c]
 
 
 def _solved(matrix: Array, right: Array) -> Array:
