@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from toolkit.mesh import TriangleMesh
 
-__all__ = ["Coarse", "decimate"]
+__all__ = ["Coarse", "closest_on_triangles", "decimate"]
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def _barycentric_rows(points: Array, coarse: TriangleMesh, landed: NDArray[np.in
     for k in range(int(counts.max(initial=0))):
         rows = np.flatnonzero(counts > k)
         candidate = near.indices[near.indptr[landed[rows]] + k]
-        bary, squared = _closest_on_triangles(points[rows], coarse.vertices[corners[candidate]])
+        bary, squared = closest_on_triangles(points[rows], coarse.vertices[corners[candidate]])
         better = squared < best[rows]
         chosen = rows[better]
         best[chosen], triangle[chosen], weights[chosen] = squared[better], candidate[better], bary[better]
@@ -66,7 +66,7 @@ def _barycentric_rows(points: Array, coarse: TriangleMesh, landed: NDArray[np.in
     return sp.csr_matrix((weights.ravel(), (rows, columns.ravel())), shape=(len(points), n))
 
 
-def _closest_on_triangles(p: Array, triangles: Array) -> tuple[Array, Array]:
+def closest_on_triangles(p: Array, triangles: Array) -> tuple[Array, Array]:
     """Barycentrics ``(N, 3)`` and squared distance ``(N,)`` of the closest point of one triangle each ``(N, 3, 3)``.
 
     Inside the triangle the plane's projection; otherwise the best of the three edges.

@@ -11,7 +11,7 @@ from toolkit.registration.landmarks import Landmarks
 from toolkit.registration.spline import ThinPlateSpline
 from toolkit.rigid import umeyama
 
-__all__ = ["MINIMUM", "RECOMMENDED", "check_landmarks", "misfit"]
+__all__ = ["MINIMUM", "RECOMMENDED", "check_landmarks", "extent", "misfit"]
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ def check_landmarks(landmarks: Landmarks, source: Array, target: Array, *, where
 def misfit(p: Array, q: Array) -> float:
     """RMS residual of the best similarity from ``p`` to ``q`` (N, 3), as a share of the extent of ``q``."""
     gaps = umeyama(p, q).apply(p) - q
-    return float(np.sqrt(np.mean(np.sum(gaps**2, axis=1)))) / _extent(q)
+    return float(np.sqrt(np.mean(np.sum(gaps**2, axis=1)))) / extent(q)
 
 
 def _check_ids(landmarks: Landmarks, n_source: int, n_target: int, where: object) -> None:
@@ -109,7 +109,8 @@ def _contradictions(names: tuple[str, ...], p: Array, q: Array, where: object) -
     doubts: list[str] = []
     while len(keep) > max(MINIMUM - 2, len(p) // 2):
         share, gap = _missed(p[keep], q[keep])
-        if share.max() < _REFUSED:
+        # Once one is out, those that go with it (the other of two exchanged) are looked for more closely.
+        if share.max() < (_DOUBTED if out else _REFUSED):
             doubts = [
                 f"landmark {names[keep[k]]!r} is {gap[k]:.0%} of the face's extent from where the others put it"
                 for k in np.flatnonzero(share > _DOUBTED)
@@ -132,7 +133,7 @@ def _contradiction(
             if gaps[i, j] + gaps[j, i] < 0.4 * (gaps[i, i] + gaps[j, j]):
                 what = f"{names[out[i]]!r} and {names[out[j]]!r} are exchanged on one of the faces"
                 return RegistrationError(what, where=where, remedy="exchange their vertices on one face")
-    told = ", ".join(f"{names[k]!r} {gaps[i, i] / _extent(q):.0%}" for i, k in enumerate(out[:3]))
+    told = ", ".join(f"{names[k]!r} {gaps[i, i] / extent(q):.0%}" for i, k in enumerate(out[:3]))
     what = f"landmarks contradict each other: from where the others put them, by the face's extent, are {told}"
     return RegistrationError(what, where=where, remedy="look at these pairs on both faces; move or delete them")
 
@@ -145,7 +146,7 @@ def _missed(p: Array, q: Array) -> tuple[Array, Array]:
     posed = umeyama(p, q).apply(p)
     miss = np.linalg.norm(ThinPlateSpline(posed, q).leave_one_out(), axis=1)
     near = np.sort(cdist(posed, posed), axis=1)[:, 1:4].mean(axis=1)
-    return miss / near, miss / _extent(q)
+    return miss / near, miss / extent(q)
 
 
 def _culprit(p: Array, q: Array, share: Array) -> int:
@@ -155,5 +156,8 @@ def _culprit(p: Array, q: Array, share: Array) -> int:
     return int(suspects[int(np.argmin(rest))])
 
 
-def _extent(points: Array) -> float:
-    return float(np.linalg.norm(np.ptp(points, axis=0)))
+def extent(points: Array) -> float:
+    """Diagonal of the box round points ``(N, 3)`` along their principal axes: it does not change as they turn."""
+    centred = points - points.mean(axis=0)
+    _, axes = np.linalg.eigh(centred.T @ centred)
+    return float(np.linalg.norm(np.ptp(centred @ axes, axis=0)))

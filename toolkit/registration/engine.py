@@ -17,7 +17,7 @@ from toolkit.mesh import TriangleMesh, connected_components
 from toolkit.operators import uniform_laplacian
 from toolkit.progress import Progress, silent
 from toolkit.registration.coarse import Coarse, decimate
-from toolkit.registration.consistency import check_landmarks, misfit
+from toolkit.registration.consistency import check_landmarks, extent, misfit
 from toolkit.registration.curves import Curve, match_lines, opposite_sheets, rim_loops, sheet_labels
 from toolkit.registration.finish import follow, project, smooth_field, unfold
 from toolkit.registration.interior import all_openings, behind_loops, find_interior, minor_components
@@ -140,11 +140,11 @@ class _Job:
         parameters: RegistrationParameters,
     ) -> _Job:
         picked, points = source.vertices[landmarks.source], target.vertices[landmarks.target]
-        similarity, extent = umeyama(picked, points), float(np.linalg.norm(np.ptp(points, axis=0)))
+        similarity, size = umeyama(picked, points), extent(points)
         unlikeness = misfit(picked, points)
         alike = float(np.clip((_UNLIKE - unlikeness) / (_UNLIKE - _ALIKE), 0, 1))
         near = similarity.apply(source.vertices)
-        posed = ThinPlateSpline(near[landmarks.source], points, _SPLINE_SMOOTHING * alike * extent)(near)
+        posed = ThinPlateSpline(near[landmarks.source], points, _SPLINE_SMOOTHING * alike * size)(near)
         curves = match_lines(lines, source, target, posed)
         loops, target_loops = rim_loops(lines, source, curves)
         skin = ~find_interior(source, loops)
@@ -162,7 +162,7 @@ class _Job:
             posed=posed,
             alike=alike,
             misfit=unlikeness,
-            extent=extent,
+            extent=size,
             curves=curves,
             skin=skin,
             labels=labels,
@@ -205,7 +205,7 @@ class _Job:
         """The result with its numbers, or a refusal."""
         hits = self.everything.closest(vertices)
         flipped = flipped_triangles(self.source, vertices, hits, self.skin)
-        wrong, judged = wrong_sheet(vertices, self.labels, self.surface, hits, 1e-3 * self.extent)
+        wrong, judged = wrong_sheet(vertices, self.labels, self.surface, hits, self._sheet_tolerance())
         quality = self._quality(vertices, hits, flipped, wrong, judged)
         self._refuse(quality, parameters)
         return Registration(
@@ -238,10 +238,15 @@ class _Job:
             accepted_share=float(np.mean(distance < _FOUND)),
         )
 
+    def _sheet_tolerance(self) -> float:
+        """Half an edge of the target's rims: where a sheet ends cannot be said more sharply."""
+        edges = [np.linalg.norm(np.diff(curve.points, axis=0), axis=1) for curve in self.curves if curve.opening]
+        return 0.5 * float(np.median(np.concatenate(edges))) if edges else 0.0
+
     def _face(self) -> Mask:
         """Vertices ``(V,)`` within the region that the landmarks cover: the rest of a head only follows."""
         picked = self.source.vertices[self.ids]
-        reach = 0.25 * float(np.linalg.norm(np.ptp(picked, axis=0)))
+        reach = 0.25 * extent(picked)
         nearest, _ = cKDTree(picked).query(self.source.vertices, distance_upper_bound=reach)
         return np.asarray(np.isfinite(nearest))
 

@@ -1,0 +1,124 @@
+"""Landmark files, and landmarks that cannot be right."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from toolkit.errors import InputError, RegistrationError
+from toolkit.registration.consistency import check_landmarks, misfit
+from toolkit.registration.landmarks import Landmarks, load_landmarks, save_landmarks
+
+
+def test_a_file_is_read_back(tmp_path: Path) -> None:
+    marks = Landmarks.of([3, 1, 4], [1, 5, 9], ["nose", "chin", "ear"])
+    save_landmarks(tmp_path / "landmarks.json", marks)
+    back = load_landmarks(tmp_path / "landmarks.json")
+    assert back.names == marks.names
+    np.testing.assert_array_equal(back.source, marks.source)
+    np.testing.assert_array_equal(back.target, marks.target)
+    assert json.loads((tmp_path / "landmarks.json").read_text())["pairs"][1] == {
+        "name": "chin",
+        "source": 1,
+        "target": 5,
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("{", "no landmark file"),
+        ('{"points": []}', "pairs"),
+        ('{"pairs": [{"name": "a", "source": 1}]}', "pair 0: target"),
+        ('{"pairs": [{"source": 1, "target": 2}, {"source": 1.5, "target": 2}]}', "pair 1: source is 1.5"),
+        ('{"pairs": [{"source": true, "target": 2}]}', "True"),
+        ('{"pairs": [7]}', "pair 0 is 7"),
+    ],
+)
+def test_a_bad_file_is_refused(tmp_path: Path, text: str, word: str) -> None:
+    path = tmp_path / "landmarks.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match=word):
+        load_landmarks(path)
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        load_landmarks(tmp_path / "landmarks.json")
+
+
+def _check(pair, landmarks: Landmarks) -> list[str]:
+    return check_landmarks(landmarks, pair.source.mesh.vertices, pair.target.mesh.vertices)
+
+
+def _with_target(pair, changes: dict[int, int]) -> Landmarks:
+    target = pair.landmarks.target.copy()
+    for k, vertex in changes.items():
+        target[k] = vertex
+    return Landmarks.of(pair.landmarks.source, target, pair.landmarks.names)
+
+
+def test_correct_landmarks_pass_without_a_word(pair) -> None:
+    assert _check(pair, pair.landmarks) == []
+
+
+def test_few_landmarks_are_said(pair) -> None:
+    few = Landmarks.of(pair.landmarks.source[::2], pair.landmarks.target[::2])
+    assert any("16 landmark pairs" in sentence for sentence in _check(pair, few))
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({4: -1}, "place 4.*target vertex -1"),
+        ({4: 10**6}, "place 4.*1000000"),
+        ({4: None}, "used by 2.*place 4.*place 5"),
+    ],
+)
+def test_ids_that_cannot_be_are_refused(pair, change: dict[int, int | None], word: str) -> None:
+    known = {k: int(pair.landmarks.target[5]) if v is None else v for k, v in change.items()}
+    with pytest.raises(InputError, match=word):
+        _check(pair, _with_target(pair, known))
+
+
+def test_too_few_and_flat_ones_are_refused(pair) -> None:
+    with pytest.raises(InputError, match="7 landmark pairs are too few"):
+        _check(pair, Landmarks.of(pair.landmarks.source[:7], pair.landmarks.target[:7]))
+    flat = np.column_stack([pair.source.mesh.vertices[:, :2], 0 * pair.source.mesh.vertices[:, 0]])
+    with pytest.raises(InputError, match="source landmarks lie in one plane"):
+        check_landmarks(pair.landmarks, flat, pair.target.mesh.vertices)
+
+
+def test_left_and_right_exchanged_throughout_is_refused(pair) -> None:
+    mirrored = pair.source.mesh.vertices * [-1, 1, 1]
+    with pytest.raises(RegistrationError, match="left and right are exchanged"):
+        check_landmarks(pair.landmarks, mirrored, pair.target.mesh.vertices)
+
+
+@pytest.mark.parametrize(("a", "b"), [(0, 13), (5, 18), (10, 30)])
+def test_two_exchanged_pairs_are_named(pair, a: int, b: int) -> None:
+    marks = _with_target(pair, {a: int(pair.landmarks.target[b]), b: int(pair.landmarks.target[a])})
+    with pytest.raises(RegistrationError) as caught:
+        _check(pair, marks)
+    assert f"'place {a}'" in str(caught.value)
+    assert f"'place {b}'" in str(caught.value)
+    assert "exchanged" in str(caught.value)
+
+
+@pytest.mark.parametrize("k", [2, 9, 17, 25])
+def test_a_misplaced_pair_is_named(pair, k: int) -> None:
+    points = pair.target.mesh.vertices
+    far = int(np.argmax(np.linalg.norm(points - points[pair.landmarks.target[k]], axis=1)))
+    with pytest.raises(RegistrationError, match=f"contradict.*'place {k}'"):
+        _check(pair, _with_target(pair, {k: far}))
+
+
+def test_misfit_is_zero_for_similar_faces_and_has_no_unit(pair) -> None:
+    p = pair.source.mesh.vertices[pair.landmarks.source]
+    assert misfit(p, 30 * p[:, [1, 2, 0]] + 4) == pytest.approx(0, abs=1e-12)
+    assert misfit(p, pair.truth[pair.landmarks.source] * 100) == pytest.approx(
+        misfit(p * 7 + 1, pair.truth[pair.landmarks.source])
+    )
