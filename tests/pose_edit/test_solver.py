@@ -94,7 +94,7 @@ def test_reaches_the_energy_of_a_joint_bounded_solve(patch: tuple[TriangleMesh, 
         PointConstraint(7, 30, offset=(0.0, -0.2, 0.1), weight=2.0),
         DistanceConstraint(4, (9, 24), factor=1.4),
     ]
-    parameters = EditParameters(window=(2, 9), lambda_w=lambda_w, lambda_e=30.0)
+    parameters = EditParameters(window=(2, 9), lambda_w=lambda_w, lambda_e=30.0, handle=0)
     joint = Joint(mesh, take, constraints, parameters)
     edit = PoseEditor(take, mesh.triangles).solve(constraints, parameters)
     assert np.abs(edit.weights - take.weights).max() > 1e-3
@@ -127,7 +127,7 @@ def test_the_bases_step_solves_the_full_normal_equations(patch: tuple[TriangleMe
     fixed = np.array([0, 1, 2, 40, 41] if held else [], dtype=int)
     if held:
         constraints.append(FixedConstraint(tuple(fixed.tolist())))
-    parameters = EditParameters(mode="bases", lambda_b=2.0)
+    parameters = EditParameters(mode="bases", lambda_b=2.0, handle=0)
     joint = Joint(mesh, take, constraints, parameters)
     free = np.setdiff1d(np.arange(take.n_vertices), fixed)
     full = joint.lambda_b * np.kron(np.eye(take.n_bases), joint.matrix[np.ix_(free, free)])
@@ -267,6 +267,30 @@ def test_constraints_are_about_the_visible_surface(bump: TriangleMesh, face: Edi
     assert np.abs(edit.smooth_frame(KEY)[a] + details[KEY, a] - place).max() < 1e-4
     (old, new) = (x[a] - x[b] for x in (face.smooth_frame(40) + details[40], edit.smooth_frame(40) + details[40]))
     assert np.abs(new - 1.2 * old).max() < 1e-4
+
+
+def test_a_handle_takes_the_spike_off(bump: TriangleMesh, face: EditableTake) -> None:
+    v = vertex_near(face, 0.0, -0.3)
+    ring = np.setdiff1d(bump.triangles[(bump.triangles == v).any(axis=1)], v)
+    pull = PointConstraint(KEY, v, offset=(0.0, 0.0, 0.1))
+    near = PointConstraint(KEY, int(ring[0]), offset=(0.0, 0.0, 0.1))
+    follows = []
+    for handle in (0.0, 0.08):
+        parameters = EditParameters(mode="bases", handle=handle)
+        editor = PoseEditor(face, bump.triangles)
+        edit = editor.solve([pull], parameters)
+        assert edit.residuals[0].left < 0.01 * edit.residuals[0].asked
+        moved = edit.smooth_frame(KEY) - face.smooth_frame(KEY)
+        follows.append(moved[ring, 2].min() / moved[v, 2])
+        # The energy told is that of the edited bases, whatever they were sought among.
+        delta = edit.moves.of_bases()
+        bent = sum(float(np.sum(d * (face.system.matrix @ d))) for d in delta)
+        left = parameters.lambda_e / editor._edge**2 * edit.residuals[0].left ** 2
+        assert edit.energies[-1] == pytest.approx(bent + left, rel=1e-6)
+        both = editor.solve([pull, near], parameters)
+        assert max(residual.left for residual in both.residuals) < 0.01 * 0.1
+    assert follows[1] > 0.9 > follows[0]
+    assert 1 - follows[1] < 0.5 * (1 - follows[0])
 
 
 def test_contradictions_are_told_by_their_residuals(bump: TriangleMesh, face: EditableTake) -> None:

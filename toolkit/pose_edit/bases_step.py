@@ -8,6 +8,11 @@ The normal matrix is ``I_K (x) A`` and one rank-1 term for each row. By Woodbury
 ``delta_k = (1 / lambda_b) sum_a w_(t_a) k A^-1 c_a^T y_a`` with ``M y = r``,
 ``M = diag(1 / (lambda_e omega)) + (W W^T o C A^-1 C^T) / lambda_b``: one back-substitution for each constrained vertex,
 once, and a dense system as small as the constraints are few.
+
+``A`` is of second order, so the exact answer to a pull at one vertex is a tent with a spike on it: on a mesh of 20,000
+vertices the first ring follows by 84 %. With a handle's radius the pull acts on a small disc instead: the answer is
+sought among the responses ``A^-1 f`` to pulls ``f`` on such discs, still meets the goal at the vertex itself, and is
+smooth there (97 % with a disc of three edges). Radius 0 is the paper's.
 """
 
 from __future__ import annotations
@@ -15,6 +20,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from toolkit.pose_edit.handles import Handles
 from toolkit.pose_edit.take import TransferSystem
 from toolkit.solve import Factor, factorise
 
@@ -27,14 +33,14 @@ _MOST_KEPT = 512
 
 
 class Responses:
-    """``Z = A^-1 E``: how the whole face follows a pull at single vertices; columns are kept for the next solve.
+    """``Z = A^-1 F``: how the whole face follows pulls at some vertices; columns are kept for the next solve.
 
     ``held`` vertices do not follow: their rows and columns are struck from ``A``, which is factorised anew, once for
     each set of held vertices. The system is smaller then, so every substitution is quicker.
     """
 
-    def __init__(self, system: TransferSystem, held: Ids) -> None:
-        self.held = held
+    def __init__(self, system: TransferSystem, held: Ids, handles: Handles) -> None:
+        self.held, self.handles = held, handles
         n_vertices = system.matrix.shape[0]
         self._n_vertices = n_vertices
         self._free = np.setdiff1d(np.arange(n_vertices), held)
@@ -45,7 +51,10 @@ class Responses:
         self._last: tuple[Ids, Array] = (np.zeros(0, dtype=np.int64), np.zeros((n_vertices, 0)))
 
     def __call__(self, vertices: Ids) -> Array:
-        """``Z`` (V, U) for some vertices (U,); zero columns for held ones."""
+        """``Z`` (V, U) for some vertices (U,); zero columns for held ones.
+
+        With handles, ``Z G^-1 X^T``: ``X = E Z`` what each pull does at the vertices, ``G = F^T Z`` what it costs.
+        """
         if np.array_equal(vertices, self._last[0]):
             return self._last[1]
         missing = [int(v) for v in vertices if int(v) not in self._columns]
@@ -58,12 +67,14 @@ class Responses:
         columns = np.empty((self._n_vertices, len(vertices)))
         for j, v in enumerate(vertices):
             columns[:, j] = self._columns[int(v)]
+        if self.handles.radius > 0:
+            cost = self.handles.pulls(vertices).T @ columns
+            columns = columns @ (np.linalg.pinv(cost, rcond=1e-12, hermitian=True) @ columns[vertices].T)
         self._last = (np.array(vertices), columns)
         return columns
 
     def _solve(self, vertices: Ids) -> Array:
-        right = np.zeros((self._n_vertices, len(vertices)))
-        right[vertices, np.arange(len(vertices))] = 1
+        right = self.handles.pulls(vertices).toarray()
         if not len(self.held):
             return self._factor.solve(right)
         result = np.zeros_like(right)

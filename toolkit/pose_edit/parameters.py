@@ -23,6 +23,9 @@ class EditParameters:
     constraints. Only their ratios count, and they mean the same at any size, unit and window: constraints are measured
     in units of the median edge, weights by how far the bases move the face and by the window's length.
 
+    ``handle`` is the radius of the disc that a pull takes hold of, as a share of the rest shape's diagonal; 0, the
+    paper's, leaves a spike at every constrained vertex (`toolkit.pose_edit.bases_step`).
+
     ``smoothness`` is the time in frames below which weights prefer to bend slowly; 0 is the paper's velocity term
     alone. ``coupled`` lets the weights step know that the bases will follow; False is the paper's plain alternation,
     which stops earlier and farther from the optimum. ``tolerance`` ends the rounds when one gains less than this share.
@@ -33,6 +36,7 @@ class EditParameters:
     lambda_b: float = 1.0
     lambda_w: float = 1.0
     lambda_e: float = 1000.0
+    handle: float = 0.015
     smoothness: float = 5.0
     coupled: bool = True
     tolerance: float = 0.05
@@ -46,6 +50,10 @@ class EditParameters:
                 f"lambda_b = {self.lambda_b}, lambda_w = {self.lambda_w}, lambda_e = {self.lambda_e}: all must be "
                 "positive",
                 remedy='to lock the bases or the weights, choose the mode "weights" or "bases"',
+            )
+        if not 0 <= self.handle < 1:
+            raise InputError(
+                f"a handle of {self.handle} times the face makes no sense", remedy="give a share like 0.015, or 0"
             )
         if not (self.smoothness >= 0 and self.tolerance >= 0 and self.most_rounds >= 1):
             raise InputError(

@@ -19,6 +19,7 @@ from toolkit.errors import InputError
 from toolkit.mesh.topology import unique_edges
 from toolkit.pose_edit.bases_step import Responses, bases_metric
 from toolkit.pose_edit.constraints import Constraint, ConstraintRows, FixedConstraint, rows_of
+from toolkit.pose_edit.handles import Handles
 from toolkit.pose_edit.parameters import EditParameters
 from toolkit.pose_edit.result import PoseEdit, Residual
 from toolkit.pose_edit.take import EditableTake, LowRankMoves
@@ -44,6 +45,7 @@ class PoseEditor:
     def __init__(self, take: EditableTake, triangles: NDArray[np.integer]) -> None:
         self.take = take
         edges = unique_edges(triangles)
+        self._edges = edges
         apart = take.rest[edges[:, 0]] - take.rest[edges[:, 1]]
         self._edge = float(np.median(np.sqrt(np.sum(apart**2, axis=1))))
         self._reach = _reach(take)
@@ -89,7 +91,7 @@ class PoseEditor:
                 f"frame {rows.frames[~inside][0]} is edited but lies outside the window from {first} to {last}",
                 remedy='widen the window, or let the bases change too (mode "both")',
             )
-        responses = self._respond(rows) if parameters.mode != "weights" else None
+        responses = self._respond(rows, parameters.handle) if parameters.mode != "weights" else None
         # Constraints in units of the median edge; weights in units of what they move, evened out over the window.
         lambda_e = parameters.lambda_e / self._edge**2
         lambda_w = parameters.lambda_w * (self._reach / self._edge) ** 2 * n / 4
@@ -112,11 +114,14 @@ class PoseEditor:
             lambda_e=lambda_e,
         )
 
-    def _respond(self, rows: ConstraintRows) -> Array:
+    def _respond(self, rows: ConstraintRows, handle: float) -> Array:
         """``Z`` (V, U) for the rows' vertices."""
-        if self._responses is None or not np.array_equal(self._responses.held, rows.held):
-            self._responses = Responses(self.take.system, rows.held)
-        return self._responses(rows.vertices)
+        radius = handle * float(np.sqrt(np.sum(np.ptp(self.take.rest, axis=0) ** 2)))
+        known = self._responses
+        if known is None or known.handles.radius != radius or not np.array_equal(known.held, rows.held):
+            known = Responses(self.take.system, rows.held, Handles(self.take.rest, self._edges, radius))
+            self._responses = known
+        return known(rows.vertices)
 
     def _held_gram(self, held: NDArray[np.int64]) -> Array:
         """Inner products of the bases' displacements over the held vertices, ``(K, K)``."""
