@@ -258,7 +258,7 @@ def test_fixed_in_one_frame_only(bump: TriangleMesh, face: EditableTake) -> None
 def test_constraints_are_about_the_visible_surface(bump: TriangleMesh, face: EditableTake) -> None:
     rng = np.random.default_rng(2)
     details = 0.02 * rng.normal(size=(face.n_frames, face.n_vertices, 3))
-    seen = replace(face, detail_offset=lambda frame, ids: details[frame, ids])
+    seen = replace(face, detail_offset=lambda frame, ids, shape_at: details[frame, ids])
     a, b = vertex_near(face, 0.3, -0.6), vertex_near(face, -0.4, -0.5)
     before = face.smooth_frame(KEY) + details[KEY]
     place = before[a] + [0.02, 0.03, -0.05]

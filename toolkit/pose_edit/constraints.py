@@ -37,6 +37,7 @@ class PointConstraint:
     weight: float = 1.0
 
     def __post_init__(self) -> None:
+        _check_whole((self.frame, self.vertex))
         if (self.place is None) == (self.offset is None):
             raise InputError(f"the point constraint on vertex {self.vertex} needs either a place or an offset")
         given = np.asarray(self.place if self.place is not None else self.offset, dtype=np.float64)
@@ -59,6 +60,7 @@ class DistanceConstraint:
     weight: float = 1.0
 
     def __post_init__(self) -> None:
+        _check_whole((self.frame, *self.vertices))
         given = self.length if self.length is not None else self.factor
         if (self.length is None) == (self.factor is None) or given is None:
             raise InputError(f"the distance constraint on vertices {self.vertices} needs either a length or a factor")
@@ -83,6 +85,7 @@ class FixedConstraint:
     weight: float = 1.0
 
     def __post_init__(self) -> None:
+        _check_whole((*self.vertices, *(self.frames or ())))
         if self.frames is not None and len(self.vertices) * len(self.frames) > _MOST_FIXED:
             raise InputError(
                 f"{len(self.vertices)} vertices in {len(self.frames)} frames are too many to fix one by one",
@@ -188,6 +191,12 @@ def _distance_row(constraint: DistanceConstraint, take: EditableTake, owner: int
     length = constraint.length if constraint.length is not None else (constraint.factor or 0.0) * present
     goal = apart * (length / present) - (detail[0] - detail[1]) - (take.rest[ids[0]] - take.rest[ids[1]])
     return _Row(frame, {ids[0]: 1.0, ids[1]: -1.0}, goal, constraint.weight, owner)
+
+
+def _check_whole(ids: Sequence[int]) -> None:
+    if len(ids) and np.asarray(ids).dtype.kind not in "iu":
+        wrong = next(value for value in ids if not isinstance(value, int | np.integer))
+        raise InputError(f"{wrong!r} is no number of a frame or vertex", remedy="give whole numbers from 0 on")
 
 
 def _check_weight(weight: float) -> None:

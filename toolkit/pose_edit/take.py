@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 
 from toolkit.solve import Factor
 
-__all__ = ["DetailOffset", "EditableTake", "LowRankMoves", "TransferSystem"]
+__all__ = ["DetailOffset", "EditableTake", "LowRankMoves", "ShapeAt", "TransferSystem"]
 
 Array = NDArray[np.float64]
 
-DetailOffset = Callable[[int, NDArray[np.int64]], Array]
-"""``detail_offset(frame, vertices)``: what details add to the smoothed surface there, (n, 3)."""
+ShapeAt = Callable[[NDArray[np.int64]], Array]
+"""``shape_at(vertices)``: places on the smoothed surface of one frame, (n, 3)."""
+
+DetailOffset = Callable[[int, NDArray[np.int64], ShapeAt], Array]
+"""``detail_offset(frame, vertices, shape_at)``: what details add to the smoothed surface there, (n, 3)."""
 
 
 class TransferSystem(Protocol):
@@ -59,7 +62,7 @@ class EditableTake:
     moves : (K, V, 3) ``b'_k - T~_0``
     weights : (T, K), non-negative
     system : the transfer's normal matrix and factor
-    detail_offset : what the user sees is the smoothed surface plus this; nothing by default
+    detail_offset : what the user sees is the smoothed surface plus this (`VisibleDetails`); nothing by default
     edits : earlier edits of the bases, kept as low-rank additions to ``moves``
     """
 
@@ -100,7 +103,9 @@ class EditableTake:
     def detail_at(self, frame: int, vertices: Sequence[int] | NDArray[np.integer]) -> Array:
         """What details add at some vertices of a frame, ``(n, 3)``."""
         ids = np.asarray(vertices, dtype=np.int64)
-        return np.zeros((len(ids), 3)) if self.detail_offset is None else self.detail_offset(frame, ids)
+        if self.detail_offset is None:
+            return np.zeros((len(ids), 3))
+        return self.detail_offset(frame, ids, lambda near: self.rest[near] + self.displacements_at(frame, near))
 
     def smooth_frame(self, frame: int) -> Array:
         """The smoothed surface of one frame, ``(V, 3)``."""
