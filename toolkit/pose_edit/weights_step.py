@@ -25,7 +25,7 @@ __all__ = ["FrameRows", "WeightsProblem", "time_matrix"]
 Array = NDArray[np.float64]
 
 _MOST_STEPS = 60
-_MOST_CORRECTIONS = 4
+_MOST_CORRECTIONS = 2
 # Complementarity, as a share of its start, at which the interior point stops.
 _CLOSE = 1e-9
 # How far inside the bounds the interior point begins; weights are of order 1.
