@@ -33,7 +33,7 @@ from toolkit.feature_lines import FeatureLine, load_feature_lines, shortest_edge
 from toolkit.mesh import TriangleMesh, face_normals, triangle_areas  # noqa: E402
 from toolkit.meshio import read_mesh  # noqa: E402
 from toolkit.registration import Landmarks, Registration, register  # noqa: E402
-from toolkit.registration.curves import match_lines, rim_loops, sheet_labels  # noqa: E402
+from toolkit.registration.curves import loops_of, sheet_labels, source_rims  # noqa: E402
 from toolkit.registration.interior import behind_loops  # noqa: E402
 from toolkit.registration.surface import Surface  # noqa: E402
 
@@ -113,17 +113,16 @@ def _picked(head: Head, count: int) -> Landmarks:
         if line is None or line.target_vertices is None:
             target.append(int(whole.query(point)[1]))
         else:
-            gaps = np.linalg.norm(head.target.vertices[line.target_vertices] - point, axis=1)
-            target.append(int(line.target_vertices[np.argmin(gaps)]))
+            path = shortest_edge_path(head.target.vertices, head.target.triangles, line.target_vertices, line.closed)
+            target.append(int(path[np.argmin(np.linalg.norm(head.target.vertices[path] - point, axis=1))]))
     return Landmarks.of(source, target, [f"landmark {k}" for k in source])
 
 
 def _wrong(head: Head, result: Registration) -> float:
     """Share of the vertices near lips and lids that lie on the true surface's other sheet."""
     true = head.source.with_vertices(head.truth)
-    curves = match_lines([_onto_itself(x) for x in head.lines], true, true, head.truth)
-    loops, _ = rim_loops(head.lines, head.source, curves)
-    labels = sheet_labels(true, ~behind_loops(head.source, loops), curves, on_target=False)
+    rims = source_rims(head.lines, head.source)
+    labels = sheet_labels(true, ~behind_loops(head.source, loops_of(rims)), rims, on_target=False)
     wrong, judged = 0, 0
     for values in labels.values():
         for side in (1, -1):
@@ -135,10 +134,6 @@ def _wrong(head: Head, result: Registration) -> float:
             wrong += int(np.count_nonzero(distance[1] + head.height / 360 < distance[0]))
             judged += len(mine)
     return wrong / max(judged, 1)
-
-
-def _onto_itself(line: FeatureLine) -> FeatureLine:
-    return FeatureLine(line.name, line.closed, line.vertices, line.vertices)
 
 
 def _flipped(head: Head, result: Registration) -> float:
@@ -188,8 +183,7 @@ def _both(words: str) -> list[str]:
 
 
 def _regions(source: TriangleMesh, truth: Array, lines: list[FeatureLine], face: Mask, cm: float) -> dict[str, Mask]:
-    loops, _ = rim_loops(lines, source, [])
-    face = face & ~behind_loops(source, loops)
+    face = face & ~behind_loops(source, loops_of(source_rims(lines, source)))
     regions = {"face": face}
     for key, words in (("lips", ("lip_inner", "inner_lip")), ("lids", ("lid",))):
         rim = np.concatenate([line.vertices for line in lines if any(word in line.name for word in words)])

@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.feature_lines import FeatureLine
-from toolkit.registration.curves import closest_on_polyline, match_lines, opposite_sheets, rim_loops, sheet_labels
+from toolkit.registration.curves import (
+    closest_on_polyline,
+    loops_of,
+    match_lines,
+    opposite_sheets,
+    sheet_labels,
+    source_rims,
+    voted_labels,
+)
 
 
 def test_closest_points_on_a_polyline_against_dense_sampling() -> None:
@@ -49,9 +57,21 @@ def test_a_closed_line_is_split_at_the_corners_from_any_start(pair) -> None:
 def test_lines_without_a_partner_give_loops_only(pair) -> None:
     lines = [FeatureLine(line.name, line.closed, line.vertices) for line in pair.lines]
     assert _matched(pair, lines) == []
-    on_source, on_target = rim_loops(lines, pair.source.mesh, [])
-    assert len(on_source) == 1
-    assert on_target == []
+    (loop,) = loops_of(source_rims(lines, pair.source.mesh))
+    assert set(loop) == set(pair.source.upper) | set(pair.source.lower)
+
+
+def test_votes_beside_the_lips_lead_to_their_edges(pair) -> None:
+    face = pair.target
+    x, y = face.mesh.vertices[:, :2].T
+    near = (np.abs(x) < 0.3) & ~face.bag
+    middle = face.mesh.vertices[face.upper, 1].mean()
+    upper, lower = (np.flatnonzero(near & (np.abs(y - middle - side * 0.12) < 0.04)) for side in (1, -1))
+    labels = voted_labels(face.mesh, ~face.bag, upper, lower, 0.9)
+    inner = slice(len(face.upper) // 4, -len(face.upper) // 4)
+    assert np.all(labels[face.upper[inner]] == 1)
+    assert np.all(labels[face.lower[inner]] == -1)
+    assert not voted_labels(face.mesh, ~face.bag, upper, lower[:0], 0.9).any()
 
 
 def test_sheets_are_told_apart_where_they_touch(pair) -> None:

@@ -13,7 +13,16 @@ from scipy.sparse.csgraph import dijkstra
 from toolkit.feature_lines import FeatureLine, find_openings, shortest_edge_path, trace_lines
 from toolkit.mesh import TriangleMesh, unique_edges
 
-__all__ = ["Curve", "closest_on_polyline", "match_lines", "opposite_sheets", "rim_loops", "sheet_labels"]
+__all__ = [
+    "Curve",
+    "closest_on_polyline",
+    "loops_of",
+    "match_lines",
+    "opposite_sheets",
+    "sheet_labels",
+    "source_rims",
+    "voted_labels",
+]
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
@@ -70,18 +79,22 @@ def match_lines(lines: Sequence[FeatureLine], source: TriangleMesh, target: Tria
     return curves
 
 
-def rim_loops(
-    lines: Sequence[FeatureLine], source: TriangleMesh, curves: Sequence[Curve]
-) -> tuple[list[Ids], list[Ids]]:
-    """Vertices of the rims of all openings: rings on the source, and on the target where it has the line too.
+def source_rims(lines: Sequence[FeatureLine], source: TriangleMesh) -> list[Curve]:
+    """Both sides of every opening that the source's lines draw, with or without a partner on the target."""
+    nowhere = (np.empty((0, 3)), np.empty(0, dtype=np.int64))
+    rims = []
+    for opening in find_openings(trace_lines(lines, source.vertices, source.triangles), source.vertices):
+        rims.append(Curve(f"{opening.name} upper", opening.upper, *nowhere, opening.name, 1))
+        rims.append(Curve(f"{opening.name} lower", opening.lower, *nowhere, opening.name, -1))
+    return rims
 
-    The source's need no partner on the target: what lies behind them is interior all the same.
-    """
-    traced = trace_lines(lines, source.vertices, source.triangles)
-    on_source = [np.concatenate([o.upper, o.lower]) for o in find_openings(traced, source.vertices)]
-    names = {c.opening for c in curves if c.opening}
-    on_target = [np.concatenate([c.path for c in curves if c.opening == name]) for name in sorted(names)]
-    return on_source, on_target
+
+def loops_of(curves: Sequence[Curve], on_target: bool = False) -> list[Ids]:
+    """Vertices of the rim of each opening among the curves, on the source or on the target."""
+    names = sorted({c.opening for c in curves if c.opening})
+    return [
+        np.concatenate([c.path if on_target else c.vertices for c in curves if c.opening == name]) for name in names
+    ]
 
 
 def closest_on_polyline(points: Array, polyline: Array) -> Array:
@@ -101,25 +114,37 @@ def sheet_labels(
 
     Nearness is along the skin: lips that touch are far apart, and beyond the corners both rims are equally far.
     """
+    labels = {}
+    for name in sorted({c.opening for c in curves if c.opening}):
+        sides = {c.side: (c.path if on_target else c.vertices) for c in curves if c.opening == name}
+        if set(sides) == {1, -1}:
+            width = float(np.linalg.norm(mesh.vertices[sides[1][0]] - mesh.vertices[sides[1][-1]]))
+            labels[name] = _nearer(mesh, skin, sides[1][1:-1], sides[-1][1:-1], _REACH * width)
+    return labels
+
+
+def voted_labels(mesh: TriangleMesh, skin: NDArray[np.bool_], upper: Ids, lower: Ids, width: float) -> NDArray[np.int8]:
+    """Sheets ``(V,)`` of a target without lines, from vertices ``upper`` and ``lower`` that surely lie on them.
+
+    Such are found beside the rims, where one lip cannot be taken for the other; from there the surface itself leads
+    to the edge of each lip and no farther, as it turns inwards there.
+    """
+    if not len(upper) or not len(lower):
+        return np.zeros(mesh.n_vertices, dtype=np.int8)
+    return _nearer(mesh, skin, upper, lower, _REACH * width)
+
+
+def _nearer(mesh: TriangleMesh, skin: NDArray[np.bool_], upper: Ids, lower: Ids, reach: float) -> NDArray[np.int8]:
     edges = unique_edges(mesh.triangles)
     edges = edges[skin[edges].all(axis=1)]
     lengths = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
     graph = sp.csr_matrix((np.maximum(lengths, 1e-300), (edges[:, 0], edges[:, 1])), shape=(len(skin), len(skin)))
-    labels = {}
-    for name in sorted({c.opening for c in curves if c.opening}):
-        sides = {c.side: (c.path if on_target else c.vertices) for c in curves if c.opening == name}
-        if set(sides) != {1, -1}:
-            continue
-        width = float(np.linalg.norm(mesh.vertices[sides[1][0]] - mesh.vertices[sides[1][-1]]))
-        limit = _REACH * width * _STEADY
-        upper, lower = (
-            dijkstra(graph, directed=False, indices=sides[k][1:-1], limit=limit, min_only=True) for k in (1, -1)
-        )
-        near = np.minimum(upper, lower) < _REACH * width
-        labels[name] = np.where(
-            near & (upper * _STEADY < lower), 1, np.where(near & (lower * _STEADY < upper), -1, 0)
-        ).astype(np.int8)
-    return labels
+    above, below = (
+        dijkstra(graph, directed=False, indices=ids, limit=_STEADY * reach, min_only=True) for ids in (upper, lower)
+    )
+    near = np.minimum(above, below) < reach
+    sides = np.where(above * _STEADY < below, 1, np.where(below * _STEADY < above, -1, 0))
+    return np.where(near, sides, 0).astype(np.int8)
 
 
 def opposite_sheets(triangles: NDArray[np.integer], labels: NDArray[np.int8], side: int) -> NDArray[np.bool_]:

@@ -13,12 +13,20 @@ from scipy.spatial import cKDTree
 
 from toolkit.errors import RegistrationError
 from toolkit.feature_lines import FeatureLine
-from toolkit.mesh import TriangleMesh, connected_components
+from toolkit.mesh import TriangleMesh, connected_components, vertex_normals
 from toolkit.operators import uniform_laplacian
 from toolkit.progress import Progress, silent
 from toolkit.registration.coarse import Coarse, decimate
 from toolkit.registration.consistency import check_landmarks, extent, misfit
-from toolkit.registration.curves import Curve, match_lines, opposite_sheets, rim_loops, sheet_labels
+from toolkit.registration.curves import (
+    Curve,
+    loops_of,
+    match_lines,
+    opposite_sheets,
+    sheet_labels,
+    source_rims,
+    voted_labels,
+)
 from toolkit.registration.finish import follow, project, smooth_field, unfold
 from toolkit.registration.interior import all_openings, behind_loops, find_interior, minor_components
 from toolkit.registration.landmarks import Landmarks
@@ -146,12 +154,16 @@ class _Job:
         near = similarity.apply(source.vertices)
         posed = ThinPlateSpline(near[landmarks.source], points, _SPLINE_SMOOTHING * alike * size)(near)
         curves = match_lines(lines, source, target, posed)
-        loops, target_loops = rim_loops(lines, source, curves)
+        rims = source_rims(lines, source)
+        loops, target_loops = loops_of(rims), loops_of(curves, on_target=True)
         skin = ~find_interior(source, loops)
         # The same sign on both sides: skin that one side calls hidden would look for its place elsewhere.
         hidden = minor_components(target) | behind_loops(target, target_loops)
         target_skin = ~hidden if all_openings(loops) else ~find_interior(target, target_loops)
-        labels = sheet_labels(source, skin, curves, on_target=False)
+        labels = sheet_labels(source, skin, rims, on_target=False)
+        everything = Surface(target)
+        votes = _voted(source.with_vertices(posed), rims, labels, target, target_skin, everything)
+        target_labels = votes | sheet_labels(target, target_skin, curves, on_target=True)
         return cls(
             source=source,
             target=target,
@@ -166,8 +178,8 @@ class _Job:
             curves=curves,
             skin=skin,
             labels=labels,
-            surface=_sheeted(target, target_skin, sheet_labels(target, target_skin, curves, on_target=True)),
-            everything=Surface(target),
+            surface=_sheeted(target, target_skin, target_labels),
+            everything=everything,
         )
 
     def solve(self, parameters: RegistrationParameters, progress: Progress) -> Array:
@@ -303,6 +315,31 @@ class _Gather:
     def vote(self, labels: NDArray[np.int8]) -> NDArray[np.int8]:
         """Label ``(C,)`` of most of the fine vertices round each coarse one, 0 where they are divided."""
         return np.round(self.share(labels)).astype(np.int8)
+
+
+def _voted(
+    posed: TriangleMesh,
+    rims: Sequence[Curve],
+    labels: Mapping[str, NDArray[np.int8]],
+    target: TriangleMesh,
+    target_skin: Mask,
+    surface: Surface,
+) -> dict[str, NDArray[np.int8]]:
+    """The target's sheets by the closest points of source vertices that lie well beside their rim."""
+    hits = surface.closest(posed.vertices)
+    agree = np.einsum("nd,nd->n", vertex_normals(posed.vertices, posed.triangles), hits.normals) > _VOTE_AGREES
+    corner = target.triangles[hits.triangles, np.argmax(hits.weights, axis=1)]
+    votes = {}
+    for name, values in labels.items():
+        ids = np.concatenate([rim.vertices for rim in rims if rim.opening == name])
+        width = float(np.linalg.norm(np.ptp(posed.vertices[ids], axis=0)))
+        beside = cKDTree(posed.vertices[ids]).query(posed.vertices)[0] > _VOTE_BESIDE * width
+        upper, lower = (np.unique(corner[(values == side) & beside & agree]) for side in (1, -1))
+        votes[name] = voted_labels(target, target_skin, np.setdiff1d(upper, lower), np.setdiff1d(lower, upper), width)
+    return votes
+
+
+_VOTE_BESIDE, _VOTE_AGREES = 0.12, 0.7
 
 
 def _sheeted(target: TriangleMesh, skin: Mask, labels: Mapping[str, NDArray[np.int8]]) -> SheetedSurface:
