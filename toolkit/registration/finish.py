@@ -26,7 +26,7 @@ _STEPS = 4
 _NEAR = 0.01
 """Only vertices whose offset is under this share of the extent are moved onto the surface."""
 _UNFOLDINGS, _TURNED = 5, 0.1
-_NEIGHBOURS = 24
+_NEIGHBOURS = 48
 
 
 def smooth_field(triangles: NDArray[np.integer], field: Array, rounds: int = 4) -> Array:
@@ -123,7 +123,7 @@ def follow(mesh: TriangleMesh, posed: Array, points: Array, skin: Mask, parts: N
     weight /= weight.sum(axis=1, keepdims=True)
     displacement = points - posed
     displacement[hidden] = np.einsum("nk,nkd->nd", weight, displacement[visible][nearest])
-    even = smooth_field(mesh.triangles, displacement, rounds=6)
+    even = smooth_field(mesh.triangles, displacement, rounds=30)
     moved = points.copy()
     moved[hidden] = posed[hidden] + even[hidden]
     main = np.bincount(parts[visible]).argmax()
