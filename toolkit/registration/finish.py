@@ -26,6 +26,7 @@ _STEPS = 4
 _NEAR = 0.01
 """Only vertices whose offset is under this share of the extent are moved onto the surface."""
 _UNFOLDINGS, _TURNED = 5, 0.1
+_ERODINGS, _MOSTLY = 3, 0.4
 _NEIGHBOURS = 48
 
 
@@ -76,7 +77,19 @@ def project(
         points[free] += np.where(good, gap / np.maximum(slope, 0.5), 0.0)[:, None] * normals[free]
     good &= np.linalg.norm(points[free] - start[free], axis=1) < _NEAR * extent
     known[free[good]] = True
+    known &= ~_ragged(mesh.triangles, known, skin)
     return start + _harmonic_fill(mesh.triangles, points - start, known)
+
+
+def _ragged(triangles: NDArray[np.integer], known: Mask, skin: Mask) -> Mask:
+    """Skin where found and unfound vertices mix: in ears and hair each vertex finds another place, or none."""
+    adjacency = vertex_adjacency(triangles, len(known))
+    around = np.maximum(adjacency @ skin.astype(float), 1)
+    ragged = np.zeros(len(known), dtype=bool)
+    for _ in range(_ERODINGS):
+        lost = (adjacency @ (skin & (~known | ragged)).astype(float)) / around > _MOSTLY
+        ragged |= skin & lost
+    return ragged
 
 
 def unfold(posed: TriangleMesh, points: Array, skin: Mask) -> Array:
