@@ -160,6 +160,14 @@ def test_cancelling_keeps_what_was(bump: TriangleMesh, take: np.ndarray, tmp_pat
     assert not list(tmp_path.glob(".*part*"))
 
 
+def test_frames_are_checked_without_landmarks_too(bump: TriangleMesh, take: np.ndarray, tmp_path: Path) -> None:
+    take[7, 100, 1] = np.nan
+    shot = make_shot(tmp_path, bump, take, bump.vertices)
+    with pytest.raises(InputError, match="frame 7: vertex 100 has no finite position"):
+        run_stages(shot)
+    assert not (tmp_path / "result").exists()
+
+
 def test_another_topology_needs_landmarks(bump: TriangleMesh, take: np.ndarray, tmp_path: Path) -> None:
     shot = make_shot(tmp_path, bump, take, bump.vertices)
     write_mesh(tmp_path / "target.ply", TriangleMesh(bump.vertices, bump.triangles[:-1]))

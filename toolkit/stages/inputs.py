@@ -7,7 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from toolkit.checks import check_inputs
+from toolkit.checks import (
+    check_feature_lines,
+    check_inputs,
+    check_mesh,
+    check_pair,
+    check_sequence,
+    log_findings,
+    raise_for,
+)
 from toolkit.checks.inputs import Places
 from toolkit.feature_lines import FeatureLine, load_feature_lines, save_feature_lines, trace_lines
 from toolkit.mesh import Polygons, TriangleMesh, connected_components
@@ -68,6 +76,8 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
         source, target, lines = checked.source, checked.target, list(checked.lines)
         landmarks = Landmarks(landmarks.source, checked.target_ids, landmarks.names)
         folder.numbers["findings"] = [f.sentence for f in checked.findings] + list(checked.notes)
+    else:
+        _check_without_landmarks(source, target, sequence, lines, places, progress)
     _save_mesh(folder, "source", source)
     _save_mesh(folder, "target", target)
     folder.save("landmarks", np.stack([landmarks.source, landmarks.target], axis=1))
@@ -87,6 +97,25 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
         "parts": connected_components(source.triangles, source.n_vertices)[0],
         "same_topology": same,
     }
+
+
+def _check_without_landmarks(
+    source: TriangleMesh,
+    target: TriangleMesh,
+    sequence: FrameSequence,
+    lines: list[FeatureLine],
+    places: Places,
+    progress: Progress,
+) -> None:
+    """The checks of a target that is on the source's topology already; its vertices stay as they are."""
+    for findings in (
+        check_mesh(source, places.source) + check_mesh(target, places.target),
+        check_pair(source, sequence, places.source),
+        check_feature_lines(lines, source, places.feature_lines),
+        check_sequence(sequence, source, progress=progress),
+    ):
+        raise_for(findings)
+        log_findings(findings)
 
 
 def same_topology(source: TriangleMesh, target: TriangleMesh) -> bool:
