@@ -15,8 +15,8 @@ from toolkit.mesh import TriangleMesh
 
 __all__ = ["ADVISED_LANDMARKS", "NEEDED_LANDMARKS", "check_feature_lines", "check_landmarks"]
 
-NEEDED_LANDMARKS = 6
-"""A spline in space needs four, not in one plane; two more tell a wrong one."""
+NEEDED_LANDMARKS = 8
+"""A spline in space needs four, not in one plane; four more tell a wrong one. The registration asks for as many."""
 
 ADVISED_LANDMARKS = 30
 """Below this the registration's error grows quickly; 40 to 50 are better still."""

@@ -6,17 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
+from toolkit.checks.picks import ADVISED_LANDMARKS, NEEDED_LANDMARKS
 from toolkit.errors import InputError, RegistrationError
 from toolkit.registration.landmarks import Landmarks
 from toolkit.registration.spline import ThinPlateSpline
 from toolkit.rigid import umeyama
 
-__all__ = ["MINIMUM", "RECOMMENDED", "check_landmarks", "extent", "misfit"]
+__all__ = ["check_landmarks", "extent", "misfit"]
 
 Array = NDArray[np.float64]
-
-MINIMUM, RECOMMENDED = 8, 30
-"""Fewer than the first are refused, fewer than the second warned about; 40 to 50 are better still."""
 
 _MIRROR = 0.7
 """A mirrored fit with less than this share of the plain fit's residual means that left and right are exchanged."""
@@ -41,17 +39,21 @@ def check_landmarks(landmarks: Landmarks, source: Array, target: Array, *, where
     RegistrationError : left and right exchanged, or pairs that contradict the others; the worst are named
     """
     _check_ids(landmarks, len(source), len(target), where)
-    if len(landmarks) < MINIMUM:
+    if len(landmarks) < NEEDED_LANDMARKS:
         raise InputError(
-            f"{len(landmarks)} landmark pairs are too few", where=where, remedy=f"pick {MINIMUM} at least, better 40"
+            f"{len(landmarks)} landmark pairs are too few",
+            where=where,
+            remedy=f"pick {NEEDED_LANDMARKS} at least, better 40",
         )
     p, q = source[landmarks.source], target[landmarks.target]
     for side, points in (("source", p), ("target", q)):
         _check_spread(points, side, where)
     _check_mirror(p, q, where)
     doubts = _contradictions(landmarks.names, p, q, where)
-    if len(landmarks) < RECOMMENDED:
-        doubts.append(f"only {len(landmarks)} landmark pairs; {RECOMMENDED} to 50 give a much closer correspondence")
+    if len(landmarks) < ADVISED_LANDMARKS:
+        doubts.append(
+            f"only {len(landmarks)} landmark pairs; {ADVISED_LANDMARKS} to 50 give a much closer correspondence"
+        )
     return doubts
 
 
@@ -107,7 +109,7 @@ def _contradictions(names: tuple[str, ...], p: Array, q: Array, where: object) -
     keep = np.arange(len(p))
     out: list[int] = []
     doubts: list[str] = []
-    while len(keep) > max(MINIMUM - 2, len(p) // 2):
+    while len(keep) > max(NEEDED_LANDMARKS - 2, len(p) // 2):
         share, gap = _missed(p[keep], q[keep])
         # Once one is out, those that go with it (the other of two exchanged) are looked for more closely.
         if share.max() < (_DOUBTED if out else _REFUSED):
