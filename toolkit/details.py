@@ -7,7 +7,6 @@ faces and ``g`` the user's gain. No solve: a frame is a product, local frames an
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -125,22 +124,13 @@ def reconstruct_sequence(
     details: NDArray[np.float32],
     out: NDArray[np.float32],
     progress: Progress = silent,
-    finish: Callable[[int, int, NDArray[np.float32]], None] | None = None,
 ) -> None:
-    """Write every frame to ``out`` (T, V, 3), possibly memory-mapped, from motion details (T, V, 3).
-
-    ``finish(start, stop, frames)`` may change each block before it is stored.
-    """
-    n_vertices = out.shape[1]
+    """Write every frame to ``out`` (T, V, 3), possibly memory-mapped, from motion details (T, V, 3)."""
 
     def work(start: int, stop: int) -> None:
-        frames = np.empty((stop - start, n_vertices, 3), dtype=np.float32)
-        reconstruction.frames(start, stop, np.ascontiguousarray(details[start:stop]), frames)
-        if finish is not None:
-            finish(start, stop, frames)
-        out[start:stop] = frames
+        reconstruction.frames(start, stop, np.ascontiguousarray(details[start:stop]), out[start:stop])
 
-    map_blocks(work, len(out), block_size(n_vertices), what="building frames", progress=progress)
+    map_blocks(work, len(out), block_size(out.shape[1]), what="building frames", progress=progress)
 
 
 def local_size_ratio(source: Array, target: Array, triangles: NDArray[np.integer]) -> Array:

@@ -50,7 +50,7 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     config = shot.config
     source, target = read_mesh(config.source.reference), read_mesh(config.target.reference)
     sequence = open_sequence(config.source.frames, fps=config.source.fps)
-    landmarks = load_landmarks(shot.landmarks_path) if shot.landmarks_path.exists() else Landmarks.of([], [])
+    landmarks = load_landmarks(shot.landmarks_path) if shot.landmarks_path.exists() else Landmarks.none()
     same = same_topology(source, target)
     lines: list[FeatureLine] = []
     if shot.feature_lines_path.exists():
