@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from toolkit.decomposition import Decomposer, coating, decompose_sequence, frame_neighbours, reconstruct_from_coating
+from toolkit.blocks import block_ranges, map_blocks
+from toolkit.decomposition import Decomposer, coating, decompose_block, frame_neighbours, reconstruct_from_coating
 from toolkit.mesh import TriangleMesh, connected_components, local_frames
 from toolkit.meshio.sequence import FrameSequence
 from toolkit.operators import smoothing_average
@@ -29,7 +30,9 @@ def decomposed(mesh: TriangleMesh, frames: np.ndarray, motion: HeadMotion | None
     smooth = np.full(frames.shape, np.nan, dtype=np.float32)
     details = np.full(frames.shape, np.nan, dtype=np.float32)
     motion = motion or HeadMotion.none(len(frames))
-    decompose_sequence(as_sequence(frames), decomposer, motion, smooth, details)
+    sequence = as_sequence(frames)
+    for start, stop in block_ranges(len(frames), 16):
+        decompose_block(sequence, decomposer, motion, start, stop, smooth[start:stop], details[start:stop])
     return decomposer, smooth, details
 
 
@@ -98,5 +101,10 @@ def test_an_error_in_a_block_is_raised(bump: TriangleMesh, take: np.ndarray) -> 
 
     sequence = FrameSequence(40, bump.n_vertices, 30.0, "memory", broken)
     out = np.empty(take.shape, dtype=np.float32)
+    decomposer = Decomposer(bump)
+
+    def work(start: int, stop: int) -> None:
+        decompose_block(sequence, decomposer, HeadMotion.none(40), start, stop, out[start:stop], out[start:stop])
+
     with pytest.raises(OSError, match="disk gone"):
-        decompose_sequence(sequence, Decomposer(bump), HeadMotion.none(40), out, out)
+        map_blocks(work, 40, 16, what="decomposing frames")

@@ -15,14 +15,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from toolkit.blocks import block_size, map_blocks
 from toolkit.kernels import block_to_frames, frames_to_block, take_details
 from toolkit.mesh.core import TriangleMesh
 from toolkit.mesh.geometry import local_frames, vertex_normals
 from toolkit.mesh.topology import connected_components, unique_edges, vertex_adjacency
 from toolkit.meshio.sequence import FrameSequence
 from toolkit.operators import uniform_laplacian
-from toolkit.progress import Progress, silent
 from toolkit.smoothing import SmoothingFilter, SmoothingParameters
 from toolkit.solve import factorise
 from toolkit.stabilisation import HeadMotion
@@ -31,7 +29,7 @@ __all__ = [
     "Decomposer",
     "RestShape",
     "coating",
-    "decompose_sequence",
+    "decompose_block",
     "frame_neighbours",
     "reconstruct_from_coating",
 ]
@@ -121,23 +119,19 @@ class BlockNumbering:
         self.neighbour = np.ascontiguousarray(position[np.asarray(neighbour)[order]])
 
 
-def decompose_sequence(
+def decompose_block(
     sequence: FrameSequence,
     decomposer: Decomposer,
     motion: HeadMotion,
+    start: int,
+    stop: int,
     smooth_deltas: NDArray[np.float32],
     details: NDArray[np.float32],
-    progress: Progress = silent,
 ) -> None:
-    """Decompose a take into ``smooth_deltas`` and ``details``, both ``(T, V, 3)`` float32, possibly memory-mapped."""
-
-    def work(start: int, stop: int) -> None:
-        smooth, detail = decomposer.decompose(sequence.read(start, stop), motion, start)
-        block_to_frames(smooth, decomposer.filter.order, smooth_deltas[start:stop])
-        block_to_frames(detail, decomposer.filter.order, details[start:stop])
-
-    size = block_size(sequence.n_vertices)
-    map_blocks(work, sequence.n_frames, size, what="decomposing frames", progress=progress)
+    """Decompose frames ``start <= t < stop`` into ``smooth_deltas`` and ``details``, both ``(B, V, 3)`` float32."""
+    smooth, detail = decomposer.decompose(sequence.read(start, stop), motion, start)
+    block_to_frames(smooth, decomposer.filter.order, smooth_deltas)
+    block_to_frames(detail, decomposer.filter.order, details)
 
 
 def frame_neighbours(vertices: Array, triangles: NDArray[np.integer]) -> NDArray[np.int64]:

@@ -7,29 +7,38 @@ faces and ``g`` the user's gain. No solve: a frame is a product, local frames an
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.blocks import block_size, map_blocks
 from toolkit.coating_details import CoatingDetails
 from toolkit.decomposition import Decomposer
 from toolkit.errors import InputError
 from toolkit.kernels import add_head_motion, block_to_frames, frames_to_block, rotate_details
 from toolkit.mesh.geometry import vertex_areas
 from toolkit.operators import neighbour_average
-from toolkit.progress import Progress, silent
 from toolkit.rigid import Similarity
 from toolkit.stabilisation import HeadMotion
 
-__all__ = ["DetailParameters", "Reconstruction", "detail_gain", "local_size_ratio", "reconstruct_sequence"]
+__all__ = [
+    "BasesChange",
+    "DetailParameters",
+    "DetailsChange",
+    "Reconstruction",
+    "detail_gain",
+    "local_size_ratio",
+]
 
 Array = NDArray[np.float64]
 
 _METHODS = ("displacement", "coating")
 _SCALES = ("local", "global")
 _RATIO_SMOOTHING = 60
+_MOST_KNOWN = 32
 
 
 @dataclass(frozen=True)
@@ -58,6 +67,32 @@ class DetailParameters:
                 f"details with gain = {self.gain} and screening = {self.screening} make no sense",
                 remedy="give a finite gain and a positive screening",
             )
+
+
+class BasesChange(Protocol):
+    """A pose edit's change of the bases: basis k moves by ``responses (V, U) @ coefficients (U, K, 3)[:, k]``."""
+
+    @property
+    def responses(self) -> Array:
+        """(V, U)."""
+
+    @property
+    def coefficients(self) -> Array:
+        """(U, K, 3)."""
+
+
+class DetailsChange(Protocol):
+    """A detail edit, solved: it acts in place on details that are scaled already, in the local frames."""
+
+    @property
+    def window(self) -> tuple[int, int]:
+        """First and last frame whose moving details it may change."""
+
+    def apply(self, details: NDArray[np.float32], start: int) -> None:
+        """Change ``g s d_t`` of some frames from ``start`` on, ``(B, V, 3)``."""
+
+    def apply_static(self, static: Array) -> None:
+        """Change ``e_0'`` (V, 3)."""
 
 
 class Reconstruction:
@@ -92,45 +127,107 @@ class Reconstruction:
         self._rest = (smooth - self._origin)[order].astype(np.float32)
         moves = (bases - smooth)[:, order]  # (K, V, 3)
         self._moves = np.ascontiguousarray(moves.reshape(len(bases), -1).T, dtype=np.float32)
-        self._detail = target.rest.detail[order].astype(np.float32)
-        self._gain = np.asarray(gain)[order].astype(np.float32)
+        self._own = self._detail = target.rest.detail[order].astype(np.float32)
+        self._gain_of = np.asarray(gain, dtype=np.float32)
+        self._gain = self._gain_of[order]
         self._rotations, self._translations = _placed(motion, pose, self._origin)
         self._scale = pose.scale
+        self._bases_changes: tuple[BasesChange, ...] = ()
+        self._details_changes: tuple[DetailsChange, ...] = ()
+        # Responses in the blocks' numbering; while an edit is dragged they stay the same from solve to solve.
+        self._known: dict[int, tuple[Array, NDArray[np.float32]]] = {}
 
     @property
     def n_frames(self) -> int:
         """Number of frames T."""
         return len(self._weights)
 
+    def edited(
+        self, weights: Array, bases: Sequence[BasesChange] = (), details: Sequence[DetailsChange] = ()
+    ) -> Reconstruction:
+        """The same with other weights (T, K) and the changes of all edits; arrays are shared.
+
+        Frames that no change touches come out bit for bit as before.
+        """
+        other = copy.copy(self)
+        other._weights = np.asarray(weights, dtype=np.float32)
+        other._bases_changes, other._details_changes = tuple(bases), tuple(details)
+        static = np.array(self._target.rest.detail)
+        for change in details:
+            change.apply_static(static)
+        changed = static[self._order].astype(np.float32)
+        other._detail = self._own if np.array_equal(changed, self._own) else changed
+        return other
+
     def frames(self, start: int, stop: int, details: NDArray[np.float32], out: NDArray[np.float32]) -> None:
         """Write frames ``start <= t < stop`` to ``out`` (B, V, 3), from the source's motion details (B, V, 3)."""
-        n_vertices, size = len(self._order), stop - start
-        combined = self._moves @ self._weights[start:stop].T
-        points = combined.reshape(n_vertices, 3, size) + self._rest[:, :, None]
-        shift = np.empty((n_vertices, 3, size), dtype=np.float32)
-        frames_to_block(details, self._order, *_no_motion(size), np.zeros((n_vertices, 3)), shift)
-        block = self._target.block
-        scratch = np.empty_like(points)
-        rotate_details(points, block.triangles, block.neighbour, scratch, shift, self._gain, self._detail, shift)
-        if self._coating is not None:
-            shift = self._coating.displacement(points, shift, start, stop)
-        points += shift
+        points = self._large_scale(start, stop)
+        points += self._detail_shift(points, details, start, stop)
         add_head_motion(points, self._rotations[start:stop], self._translations[start:stop], self._scale)
         block_to_frames(points, self._order, out)
 
+    def _large_scale(self, start: int, stop: int) -> NDArray[np.float32]:
+        """``T~_t`` about the origin, ``(V, 3, B)``."""
+        weights = self._weights[start:stop]
+        points = (self._moves @ weights.T).reshape(len(self._order), 3, len(weights))
+        points += self._rest[:, :, None]
+        for change in self._bases_changes:
+            share = np.einsum("tk,ukc->uct", weights, change.coefficients).astype(np.float32)
+            if share.any():
+                points += (self._ordered(change) @ share.reshape(len(share), -1)).reshape(points.shape)
+        return points
 
-def reconstruct_sequence(
-    reconstruction: Reconstruction,
-    details: NDArray[np.float32],
-    out: NDArray[np.float32],
-    progress: Progress = silent,
-) -> None:
-    """Write every frame to ``out`` (T, V, 3), possibly memory-mapped, from motion details (T, V, 3)."""
+    def _detail_shift(
+        self, points: NDArray[np.float32], details: NDArray[np.float32], start: int, stop: int
+    ) -> NDArray[np.float32]:
+        """What details add to the large-scale ``points``, edits included, ``(V, 3, B)``."""
+        changed, scratch = self._changed(details, start, stop), np.empty_like(points)
+        if changed is None:
+            shift = self._rotated(points, details, self._gain, self._detail, scratch)
+        else:
+            shift = self._rotated(points, changed, np.ones_like(self._gain), self._detail, scratch)
+        if self._coating is None:
+            return shift
+        if changed is None and self._detail is self._own:
+            return self._coating.displacement(points, shift, start, stop)
+        # An edit is a displacement here, too: as a coating it would leak out of its region.
+        plain = self._rotated(points, details, self._gain, self._own, scratch)
+        return shift + (self._coating.displacement(points, plain, start, stop) - plain)
 
-    def work(start: int, stop: int) -> None:
-        reconstruction.frames(start, stop, np.ascontiguousarray(details[start:stop]), out[start:stop])
+    def _changed(self, details: NDArray[np.float32], start: int, stop: int) -> NDArray[np.float32] | None:
+        """Scaled details (B, V, 3) with the edits of these frames; None where there are none."""
+        acting = [c for c in self._details_changes if c.window[0] < stop and c.window[1] >= start]
+        if not acting:
+            return None
+        scaled = details * self._gain_of[:, None]
+        for change in acting:
+            change.apply(scaled, start)
+        return scaled
 
-    map_blocks(work, len(out), block_size(out.shape[1]), what="building frames", progress=progress)
+    def _rotated(
+        self,
+        points: NDArray[np.float32],
+        details: NDArray[np.float32],
+        gain: NDArray[np.float32],
+        own: NDArray[np.float32],
+        scratch: NDArray[np.float32],
+    ) -> NDArray[np.float32]:
+        """``G_t (own + gain details)`` as displacements, ``(V, 3, B)``."""
+        shift = np.empty_like(points)
+        frames_to_block(details, self._order, *_no_motion(len(details)), np.zeros((len(points), 3)), shift)
+        block = self._target.block
+        rotate_details(points, block.triangles, block.neighbour, scratch, shift, gain, own, shift)
+        return shift
+
+    def _ordered(self, change: BasesChange) -> NDArray[np.float32]:
+        """A change's responses in the blocks' numbering, (V, U)."""
+        known = self._known.get(id(change.responses))
+        if known is None or known[0] is not change.responses:
+            if len(self._known) >= _MOST_KNOWN:
+                self._known.clear()
+            known = (change.responses, change.responses[self._order].astype(np.float32))
+            self._known[id(change.responses)] = known
+        return known[1]
 
 
 def local_size_ratio(source: Array, target: Array, triangles: NDArray[np.integer]) -> Array:

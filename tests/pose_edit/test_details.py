@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.decomposition import Decomposer, decompose_sequence
+from toolkit.decomposition import Decomposer, decompose_block
 from toolkit.details import Reconstruction
 from toolkit.mesh import TriangleMesh
 from toolkit.meshio.sequence import FrameSequence
@@ -17,7 +17,7 @@ def test_a_point_lands_where_it_was_put_on_the_rebuilt_face(bump: TriangleMesh, 
     smooth, details = np.empty(take.shape, dtype=np.float32), np.empty(take.shape, dtype=np.float32)
     still = HeadMotion.none(len(take))
     sequence = FrameSequence(len(take), bump.n_vertices, 30.0, "memory", lambda a, b: take[a:b])
-    decompose_sequence(sequence, target, still, smooth, details)
+    decompose_block(sequence, target, still, 0, len(take), smooth, details)
     rest, gain = target.rest.smooth, np.full(bump.n_vertices, 1.3)
     moves = smooth[[8, 20, 39]].astype(float)
     weights = np.abs(np.linalg.lstsq(moves.reshape(3, -1).T, smooth.reshape(len(take), -1).T, rcond=None)[0].T)

@@ -11,7 +11,7 @@ import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +33,7 @@ class StageFolder:
     """A stage while it is being written: arrays go in, ``numbers`` end up in its manifest."""
 
     path: Path
-    numbers: dict[str, Any]
+    numbers: dict[str, Any] = field(default_factory=dict)
 
     def save(self, name: str, array: NDArray[Any]) -> None:
         """Store an array as ``<name>.npy``."""
@@ -42,6 +42,11 @@ class StageFolder:
     def create(self, name: str, shape: tuple[int, ...], dtype: DTypeLike = np.float32) -> NDArray[Any]:
         """A new memory-mapped array ``<name>.npy`` to be filled block by block."""
         return np.lib.format.open_memmap(self.path / f"{name}.npy", mode="w+", dtype=dtype, shape=shape)
+
+    def array(self, name: str) -> NDArray[Any]:
+        """An array that is there already, memory-mapped and read-only."""
+        loaded: NDArray[Any] = np.load(self.path / f"{name}.npy", mmap_mode="r")
+        return loaded
 
 
 class Shot:
@@ -118,7 +123,7 @@ class Shot:
         """Write a stage aside; it takes the old one's place when the block ends without an error."""
         began = time.perf_counter()
         with folder_aside(self.stage_folder(stage)) as folder:
-            writing = StageFolder(folder, {})
+            writing = StageFolder(folder)
             yield writing
             manifest = {
                 "stage": stage,

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from functools import partial
+from pathlib import Path
+
 import numpy as np
 
-from toolkit.decomposition import Decomposer, decompose_sequence
+from toolkit.blocks import block_size, map_blocks
+from toolkit.decomposition import Decomposer, decompose_block
 from toolkit.progress import Progress
 from toolkit.shot import Shot, StageFolder
 from toolkit.stabilisation import HeadMotion, fit_head_motion
+from toolkit.stages.blocks import Fill, MapBlocks, StageBlocks
 from toolkit.stages.inputs import load_mesh, load_sequence
 
 __all__ = ["load_motion", "source_decomposer", "work"]
 
 
-def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
+def work(shot: Shot, folder: StageFolder, progress: Progress, map_blocks: MapBlocks = map_blocks) -> None:
     """Stabilise and split every frame."""
     sequence = load_sequence(shot)
     decomposer = source_decomposer(shot, again=False)
@@ -24,9 +29,13 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     folder.save("rotations", motion.rotations)
     folder.save("translations", motion.translations)
     shape = (sequence.n_frames, sequence.n_vertices, 3)
-    smooth_deltas, details = folder.create("smooth_deltas", shape), folder.create("details", shape)
-    decompose_sequence(sequence, decomposer, motion, smooth_deltas, details, progress)
-    folder.save("detail_energy", _rms_per_frame(details))
+    arrays = ("smooth_deltas", "details")
+    for name in arrays:
+        folder.create(name, shape)
+    fill = partial(decompose_block, sequence, decomposer, motion)
+    blocks, size = StageBlocks(arrays, _open_blocks, shot.path, folder.path, fill), block_size(sequence.n_vertices)
+    map_blocks(blocks, sequence.n_frames, size, what="decomposing frames", progress=progress)
+    folder.save("detail_energy", _rms_per_frame(folder.array("details")))
     cosine = np.clip((np.trace(motion.rotations, axis1=1, axis2=2) - 1) / 2, -1, 1)
     folder.numbers |= {
         "head_turns_degrees": float(np.degrees(np.arccos(cosine)).max()),
@@ -45,6 +54,15 @@ def load_motion(shot: Shot) -> HeadMotion:
     """The head's motion that was taken out."""
     rotations, translations = shot.array("decompose", "rotations"), shot.array("decompose", "translations")
     return HeadMotion(np.array(rotations), np.array(translations))
+
+
+def _open_blocks(shot_path: Path, written: Path) -> Fill:
+    """The stage's work on blocks for another process, from what the stage has ``written`` so far."""
+    shot, folder = Shot(shot_path), StageFolder(written)
+    neighbour = np.array(folder.array("neighbour"))
+    decomposer = Decomposer(load_mesh(shot, "source"), shot.config.smoothing, neighbour)
+    motion = HeadMotion(np.array(folder.array("rotations")), np.array(folder.array("translations")))
+    return partial(decompose_block, load_sequence(shot), decomposer, motion)
 
 
 def _rms_per_frame(details: np.ndarray) -> np.ndarray:

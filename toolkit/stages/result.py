@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
+from toolkit.blocks import block_size, map_blocks
 from toolkit.coating_details import CoatingDetails
-from toolkit.details import Reconstruction, reconstruct_sequence
+from toolkit.details import Reconstruction
 from toolkit.progress import Progress
 from toolkit.shot import Shot, StageFolder
+from toolkit.stages.blocks import Fill, MapBlocks, StageBlocks
 from toolkit.stages.decompose import load_motion, source_decomposer
 from toolkit.stages.register import load_pose
 from toolkit.stages.transfer import target_decomposer
@@ -15,14 +19,25 @@ from toolkit.stages.transfer import target_decomposer
 __all__ = ["open_reconstruction", "work"]
 
 
-def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
+def work(shot: Shot, folder: StageFolder, progress: Progress, map_blocks: MapBlocks = map_blocks) -> None:
     """Write ``frames.npy`` and ``triangles.npy``."""
-    details = shot.array("decompose", "details")
-    reconstruction = open_reconstruction(shot)
-    frames = folder.create("frames", details.shape)
-    reconstruct_sequence(reconstruction, details, frames, progress)
+    shape = shot.array("decompose", "details").shape
+    folder.create("frames", shape)
+    blocks = StageBlocks(("frames",), _open_blocks, shot.path, folder.path, _open_blocks(shot.path, folder.path))
+    map_blocks(blocks, shape[0], block_size(shape[1]), what="building frames", progress=progress)
     folder.save("triangles", np.array(shot.array("inputs", "source_triangles")))
-    folder.numbers |= {"frames": len(frames), "vertices": frames.shape[1], "unit": "the target's"}
+    folder.numbers |= {"frames": shape[0], "vertices": shape[1], "unit": "the target's"}
+
+
+def _open_blocks(shot_path: Path, written: Path) -> Fill:
+    """The stage's work on blocks, for this process or another."""
+    shot = Shot(shot_path)
+    details, reconstruction = shot.array("decompose", "details"), open_reconstruction(shot)
+
+    def fill(start: int, stop: int, frames: np.ndarray) -> None:
+        reconstruction.frames(start, stop, np.ascontiguousarray(details[start:stop]), frames)
+
+    return fill
 
 
 def open_reconstruction(shot: Shot) -> Reconstruction:

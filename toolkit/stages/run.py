@@ -8,11 +8,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from toolkit.blocks import map_blocks
 from toolkit.errors import InputError
 from toolkit.progress import Progress, silent
-from toolkit.shot import Shot, StageFolder
+from toolkit.shot import Shot
 from toolkit.shot.hashing import key_of
 from toolkit.stages import bases, decompose, inputs, register, result, transfer
+from toolkit.stages.blocks import MapBlocks
 
 __all__ = ["STAGES", "Stage", "StageReport", "current_key", "run_stages"]
 
@@ -23,14 +25,16 @@ log = logging.getLogger(__name__)
 class Stage:
     """One step: what it is called, the stages and parameter tables it depends on, and its work.
 
-    ``version`` is part of the key: raise it when the same inputs give other arrays.
+    ``version`` is part of the key: raise it when the same inputs give other arrays. ``by_frames``: the work takes the
+    frames block by block, on a `MapBlocks` that it is given.
     """
 
     name: str
     after: tuple[str, ...]
     tables: tuple[str, ...]
-    work: Callable[[Shot, StageFolder, Progress], None]
+    work: Callable[..., None]
     version: int = 1
+    by_frames: bool = False
 
 
 STAGES: dict[str, Stage] = {
@@ -38,10 +42,10 @@ STAGES: dict[str, Stage] = {
     for stage in (
         Stage("inputs", (), (), inputs.work),
         Stage("register", ("inputs",), ("register",), register.work),
-        Stage("decompose", ("inputs",), ("stabilise", "smoothing"), decompose.work),
+        Stage("decompose", ("inputs",), ("stabilise", "smoothing"), decompose.work, by_frames=True),
         Stage("bases", ("decompose",), ("bases",), bases.work),
         Stage("transfer", ("register", "bases"), ("smoothing", "transfer", "details"), transfer.work),
-        Stage("result", ("transfer",), ("smoothing", "details"), result.work),
+        Stage("result", ("transfer",), ("smoothing", "details"), result.work, by_frames=True),
     )
 }
 
@@ -57,11 +61,17 @@ class StageReport:
 
 
 def run_stages(
-    shot: Shot, names: Sequence[str] | None = None, *, force: bool = False, progress: Progress = silent
+    shot: Shot,
+    names: Sequence[str] | None = None,
+    *,
+    force: bool = False,
+    progress: Progress = silent,
+    map_blocks: MapBlocks = map_blocks,
 ) -> list[StageReport]:
     """Run the named stages (all by default) and whatever they need that is not up to date, in order.
 
-    ``force`` runs the named ones even if they are up to date.
+    ``force`` runs the named ones even if they are up to date. ``map_blocks`` does the work of the frame stages: threads
+    of this process, or `toolkit.cluster.Cluster.map_blocks`.
     """
     wanted = list(names) if names is not None else list(STAGES)
     for name in wanted:
@@ -72,7 +82,7 @@ def run_stages(
     reports = []
     for name, stage in STAGES.items():
         if name in needed:
-            reports.append(_run(shot, stage, force and name in wanted, progress))
+            reports.append(_run(shot, stage, force and name in wanted, progress, map_blocks))
     return reports
 
 
@@ -89,7 +99,7 @@ def current_key(shot: Shot, name: str) -> str:
     return key_of(parts)
 
 
-def _run(shot: Shot, stage: Stage, force: bool, progress: Progress) -> StageReport:
+def _run(shot: Shot, stage: Stage, force: bool, progress: Progress, map_blocks: MapBlocks) -> StageReport:
     key = current_key(shot, stage.name)
     if not force and shot.is_current(stage.name, key):
         manifest = shot.manifest(stage.name) or {}
@@ -98,7 +108,7 @@ def _run(shot: Shot, stage: Stage, force: bool, progress: Progress) -> StageRepo
     log.info("%s: running", stage.name)
     began = time.perf_counter()
     with shot.write_stage(stage.name, key, _parameters(shot, stage)) as folder:
-        stage.work(shot, folder, progress)
+        stage.work(shot, folder, progress, **({"map_blocks": map_blocks} if stage.by_frames else {}))
     seconds = time.perf_counter() - began
     log.info("%s: done in %.1f s", stage.name, seconds)
     return StageReport(stage.name, False, seconds, folder.numbers)
