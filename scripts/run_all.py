@@ -8,6 +8,7 @@ import sys
 from typing import Any
 
 from _cli import parser_for, print_stages, run
+from _workers import add_workers, frame_workers
 
 from toolkit.progress import Progress
 
@@ -18,7 +19,8 @@ def main(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     from toolkit.stages import run_stages
 
     shot = Shot(options.shot)
-    reports = run_stages(shot, force=options.force, progress=progress)
+    with frame_workers(options, [shot.path]) as map_blocks:
+        reports = run_stages(shot, force=options.force, progress=progress, map_blocks=map_blocks)
     print_stages(reports)
     print(f"result: {shot.frames_path}")
     seconds = {report.stage: report.seconds for report in reports}
@@ -29,4 +31,5 @@ def main(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
 if __name__ == "__main__":
     made = parser_for(__doc__)
     made.add_argument("--force", action="store_true", help="run every step anew")
+    add_workers(made)
     sys.exit(run(made, main))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 __all__ = ["InputError", "MissingDependencyError", "RegistrationError"]
 
 
@@ -22,6 +24,14 @@ class InputError(ValueError):
         place = f"{self.where}: " if self.where else ""
         tail = f"; {remedy}" if remedy else ""
         super().__init__(f"{place}{what}{tail}.")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by the parts, so that an error from another process says the same."""
+        return _again, (type(self), self.what, self.where, self.remedy)
+
+
+def _again(kind: type[InputError], what: str, where: str, remedy: str) -> InputError:
+    return kind(what, where=where, remedy=remedy)
 
 
 class RegistrationError(InputError):

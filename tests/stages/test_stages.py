@@ -100,6 +100,17 @@ def test_only_what_changed_is_run_again(bump: TriangleMesh, take: np.ndarray, tm
     assert ran() == ["result"]
 
 
+def test_another_target_leaves_the_performance_as_it_is(bump: TriangleMesh, take: np.ndarray, tmp_path: Path) -> None:
+    shot = make_shot(tmp_path, bump, take, bump.vertices * [1.2, 1, 1])
+    run_stages(shot)
+    write_mesh(tmp_path / "target.ply", bump.with_vertices(bump.vertices * [1, 1.3, 1]))
+    ran = [report.stage for report in run_stages(Shot(tmp_path)) if not report.skipped]
+    assert ran == ["inputs", "register", "transfer", "result"]
+    write_mesh(tmp_path / "source.ply", bump.with_vertices(bump.vertices * 1.001))
+    ran = [report.stage for report in run_stages(Shot(tmp_path)) if not report.skipped]
+    assert ran == list(STAGES)
+
+
 def test_same_inputs_same_bytes(bump: TriangleMesh, take: np.ndarray, tmp_path: Path) -> None:
     results = []
     for name in ("a", "b"):

@@ -26,7 +26,8 @@ class Stage:
     """One step: what it is called, the stages and parameter tables it depends on, and its work.
 
     ``version`` is part of the key: raise it when the same inputs give other arrays. ``by_frames``: the work takes the
-    frames block by block, on a `MapBlocks` that it is given.
+    frames block by block, on a `MapBlocks` that it is given. ``reads``: the files of the stage "inputs" that it depends
+    on, beside the take, where those are not all: other picks or another target then leave it as it is.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Stage:
     work: Callable[..., None]
     version: int = 1
     by_frames: bool = False
+    reads: tuple[str, ...] = ()
 
 
 STAGES: dict[str, Stage] = {
@@ -42,8 +44,15 @@ STAGES: dict[str, Stage] = {
     for stage in (
         Stage("inputs", (), (), inputs.work),
         Stage("register", ("inputs",), ("register",), register.work),
-        Stage("decompose", ("inputs",), ("stabilise", "smoothing"), decompose.work, by_frames=True),
-        Stage("bases", ("decompose",), ("bases",), bases.work),
+        Stage(
+            "decompose",
+            ("inputs",),
+            ("stabilise", "smoothing"),
+            decompose.work,
+            by_frames=True,
+            reads=("source_vertices.npy", "source_triangles.npy"),
+        ),
+        Stage("bases", ("inputs", "decompose"), ("bases",), bases.work, reads=("lines.json",)),
         Stage("transfer", ("register", "bases"), ("smoothing", "transfer", "details"), transfer.work),
         Stage("result", ("transfer",), ("smoothing", "details"), result.work, by_frames=True),
     )
@@ -91,12 +100,20 @@ def current_key(shot: Shot, name: str) -> str:
     stage = STAGES[name]
     parts: dict[str, Any] = {"stage": name, "version": stage.version}
     parts["after"] = {earlier: current_key(shot, earlier) for earlier in stage.after}
+    if stage.reads and shot.is_current("inputs", parts["after"]["inputs"]):
+        parts["after"]["inputs"] = _contents(shot, stage.reads)
     parts["parameters"] = _parameters(shot, stage)
     if name == "inputs":
         parts["files"] = {label: shot.hashes.of(path) for label, path in inputs.files(shot).items()}
         # Formats without a frame rate take it from here; the frames themselves do not depend on it.
         parts["fps"] = shot.config.source.fps
     return key_of(parts)
+
+
+def _contents(shot: Shot, names: Sequence[str]) -> dict[str, str]:
+    """Hashes of the take and of some of what the stage "inputs" made."""
+    made = shot.stage_folder("inputs")
+    return {"frames": shot.hashes.of(shot.config.source.frames)} | {n: shot.hashes.of(made / n) for n in names}
 
 
 def _run(shot: Shot, stage: Stage, force: bool, progress: Progress, map_blocks: MapBlocks) -> StageReport:
