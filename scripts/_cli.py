@@ -74,7 +74,10 @@ class Bars:
 
 
 def run(parser: argparse.ArgumentParser, main: Main, arguments: list[str] | None = None) -> int:
-    """Parse, call ``main(options, progress)``, and turn what happens into an exit code."""
+    """Parse, call ``main(options, progress)``, and turn what happens into an exit code.
+
+    A result whose ``failed`` is not zero ends with 1: the work went on after a failure.
+    """
     options = parser.parse_args(arguments)
     level = logging.INFO if options.verbose else logging.WARNING
     logging.basicConfig(level=level, format="%(levelname)s %(message)s", stream=sys.stderr)
@@ -94,7 +97,7 @@ def run(parser: argparse.ArgumentParser, main: Main, arguments: list[str] | None
         return _fail(error, options, 1)
     if options.json:
         print(json.dumps(result, default=_plain))
-    return 0
+    return 1 if result.get("failed") else 0
 
 
 def print_stages(reports: list[Any]) -> None:

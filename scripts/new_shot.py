@@ -13,38 +13,24 @@ from typing import Any
 
 from _cli import parser_for, run
 
-from toolkit.errors import InputError
-from toolkit.meshio.aside import written_aside
 from toolkit.progress import Progress
 
 
 def main(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     """Write shot.toml and copy the picks."""
-    from toolkit.shot import ShotConfig, SourceInput, TargetInput, load_config, save_config
+    from toolkit.shot.new import create_shot
 
     folder: Path = options.shot
-    toml = folder / "shot.toml"
-    if toml.exists() and not options.force:
-        raise InputError("the shot exists already", where=toml, remedy="edit it, or give --force to write it anew")
-    inputs = {"--source-reference": options.source_reference, "--frames": options.frames, "--target": options.target}
-    for option, path in inputs.items():
-        if not path.exists():
-            raise InputError(f"there is no such file for {option}", where=path, remedy="check the path")
-    config = ShotConfig(
-        SourceInput(options.source_reference.resolve(), options.frames.resolve(), options.fps),
-        TargetInput(options.target.resolve()),
+    create_shot(
+        folder,
+        options.source_reference,
+        options.frames,
+        options.target,
+        landmarks=options.landmarks,
+        feature_lines=options.feature_lines,
+        fps=options.fps,
+        force=options.force,
     )
-    for name, path in {"landmarks.json": options.landmarks, "feature_lines.json": options.feature_lines}.items():
-        if path is not None:
-            try:
-                content = path.read_bytes()
-            except OSError as error:
-                raise InputError(f"cannot be read ({error.strerror})", where=path, remedy="check the path") from error
-            with written_aside(folder / name) as temporary:
-                temporary.write_bytes(content)
-    folder.mkdir(parents=True, exist_ok=True)
-    save_config(toml, config)
-    load_config(toml)
     print(f"made {folder}; next: python scripts/run_all.py {folder}")
     return {"shot": str(folder)}
 

@@ -19,7 +19,7 @@ from toolkit.meshio import open_sequence, read_mesh, write_mesh
 
 ROOT = Path(__file__).resolve().parents[2]
 STEPS = ("1_register", "2_decompose", "3_select_bases", "4_transfer", "5_transfer_details")
-ALL = (*STEPS, "new_shot", "run_all", "7_export", "render", "report", "demo")
+ALL = (*STEPS, "new_shot", "run_all", "7_export", "render", "report", "demo", "batch")
 
 
 def script(name: str, *arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
