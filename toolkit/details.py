@@ -166,6 +166,16 @@ class Reconstruction:
         add_head_motion(points, self._rotations[start:stop], self._translations[start:stop], self._scale)
         block_to_frames(points, self._order, out)
 
+    def detail_offsets(self, frame: int, details: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What details add to the large-scale shape of a frame, before the head's motion, ``(V, 3)``.
+
+        ``details`` (1, V, 3) are the frame's motion details.
+        """
+        shift = self._detail_shift(self._large_scale(frame, frame + 1), details, frame, frame + 1)
+        offsets = np.empty((len(self._order), 3), dtype=np.float32)
+        offsets[self._order] = shift[:, :, 0]
+        return offsets
+
     def _large_scale(self, start: int, stop: int) -> NDArray[np.float32]:
         """``T~_t`` about the origin, ``(V, 3, B)``."""
         weights = self._weights[start:stop]

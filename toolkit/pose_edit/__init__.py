@@ -18,7 +18,13 @@ before the edit, since their turn by the edit is of second order. What the user 
 from the first.
 """
 
-from toolkit.pose_edit.constraints import Constraint, DistanceConstraint, FixedConstraint, PointConstraint
+from toolkit.pose_edit.constraints import (
+    BeyondConstraint,
+    Constraint,
+    DistanceConstraint,
+    FixedConstraint,
+    PointConstraint,
+)
 from toolkit.pose_edit.data import from_data, to_data
 from toolkit.pose_edit.details import VisibleDetails
 from toolkit.pose_edit.parameters import EditParameters
@@ -27,6 +33,7 @@ from toolkit.pose_edit.solver import PoseEditor
 from toolkit.pose_edit.take import EditableTake, LowRankMoves
 
 __all__ = [
+    "BeyondConstraint",
     "Constraint",
     "DistanceConstraint",
     "EditParameters",

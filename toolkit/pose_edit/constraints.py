@@ -16,7 +16,17 @@ from numpy.typing import NDArray
 from toolkit.errors import InputError
 from toolkit.pose_edit.take import EditableTake
 
-__all__ = ["Constraint", "ConstraintRows", "DistanceConstraint", "FixedConstraint", "PointConstraint", "rows_of"]
+__all__ = [
+    "BeyondConstraint",
+    "Constraint",
+    "ConstraintRows",
+    "DistanceConstraint",
+    "FixedConstraint",
+    "PointConstraint",
+    "check_ids",
+    "handled_vertices",
+    "rows_of",
+]
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
@@ -94,7 +104,37 @@ class FixedConstraint:
         _check_weight(self.weight)
 
 
-Constraint = PointConstraint | DistanceConstraint | FixedConstraint
+@dataclass(frozen=True)
+class BeyondConstraint:
+    """Everything farther than ``distance`` from some ``vertices`` stays where it is, in every frame.
+
+    Without vertices, from all that the edit's points and distances take hold of. `toolkit.pose_edit.regions` says how
+    it is measured; the solver turns it into a `FixedConstraint`.
+    """
+
+    distance: float
+    vertices: tuple[int, ...] = ()
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_whole(self.vertices)
+        if not np.isfinite(self.distance) or self.distance <= 0:
+            raise InputError(f"a distance of {self.distance} makes no region", remedy="give a positive number")
+        _check_weight(self.weight)
+
+
+Constraint = PointConstraint | DistanceConstraint | FixedConstraint | BeyondConstraint
+
+
+def handled_vertices(constraints: Sequence[Constraint]) -> list[int]:
+    """The vertices that points and distances take hold of."""
+    found: list[int] = []
+    for constraint in constraints:
+        if isinstance(constraint, PointConstraint):
+            found.append(constraint.vertex)
+        elif isinstance(constraint, DistanceConstraint):
+            found += constraint.vertices
+    return found
 
 
 @dataclass(frozen=True)
@@ -125,7 +165,7 @@ def rows_of(constraints: Sequence[Constraint], take: EditableTake) -> Constraint
     held, held_weight = np.zeros(0, dtype=np.int64), 0.0
     for owner, constraint in enumerate(constraints):
         if isinstance(constraint, FixedConstraint):
-            _check_ids(constraint.vertices, take.n_vertices, "vertex")
+            check_ids(constraint.vertices, take.n_vertices, "vertex")
             if constraint.frames is None:
                 held = np.union1d(held, np.asarray(constraint.vertices, dtype=np.int64))
                 held_weight = max(held_weight, constraint.weight)
@@ -136,6 +176,8 @@ def rows_of(constraints: Sequence[Constraint], take: EditableTake) -> Constraint
                     rows.append(_point_row(stay, take, owner))
         elif isinstance(constraint, PointConstraint):
             rows.append(_point_row(constraint, take, owner))
+        elif isinstance(constraint, BeyondConstraint):
+            raise TypeError("a BeyondConstraint has to be turned into a FixedConstraint first")
         else:
             rows.append(_distance_row(constraint, take, owner))
     vertices = np.array(sorted({v for row in rows for v in row.parts}), dtype=np.int64)
@@ -165,8 +207,8 @@ class _Row(NamedTuple):
 
 def _point_row(constraint: PointConstraint, take: EditableTake, owner: int) -> _Row:
     frame, vertex = constraint.frame, constraint.vertex
-    _check_ids([frame], take.n_frames, "frame")
-    _check_ids([vertex], take.n_vertices, "vertex")
+    check_ids([frame], take.n_frames, "frame")
+    check_ids([vertex], take.n_vertices, "vertex")
     if constraint.offset is not None:
         goal = take.displacements_at(frame, [vertex])[0] + np.asarray(constraint.offset, dtype=np.float64)
     else:
@@ -177,8 +219,8 @@ def _point_row(constraint: PointConstraint, take: EditableTake, owner: int) -> _
 
 def _distance_row(constraint: DistanceConstraint, take: EditableTake, owner: int) -> _Row:
     frame, ids = constraint.frame, list(constraint.vertices)
-    _check_ids([frame], take.n_frames, "frame")
-    _check_ids(ids, take.n_vertices, "vertex")
+    check_ids([frame], take.n_frames, "frame")
+    check_ids(ids, take.n_vertices, "vertex")
     detail = take.detail_at(frame, ids)
     seen = take.rest[ids] + take.displacements_at(frame, ids) + detail
     apart = seen[0] - seen[1]
@@ -204,7 +246,8 @@ def _check_weight(weight: float) -> None:
         raise InputError(f"a constraint's weight of {weight} makes no sense", remedy="give a positive number")
 
 
-def _check_ids(ids: Sequence[int], count: int, what: str) -> None:
+def check_ids(ids: Sequence[int] | Ids, count: int, what: str) -> None:
+    """Raise InputError where an id is not from 0 to ``count - 1``; ``what`` says of what."""
     array = np.asarray(ids)
     wrong = array[(array < 0) | (array >= count)]
     if len(wrong):

@@ -7,15 +7,22 @@ from dataclasses import asdict, fields
 from typing import Any
 
 from toolkit.errors import InputError
-from toolkit.pose_edit.constraints import Constraint, DistanceConstraint, FixedConstraint, PointConstraint
+from toolkit.pose_edit.constraints import (
+    BeyondConstraint,
+    Constraint,
+    DistanceConstraint,
+    FixedConstraint,
+    PointConstraint,
+)
 from toolkit.pose_edit.parameters import EditParameters
 
 __all__ = ["from_data", "to_data"]
 
-_KINDS: dict[str, type[PointConstraint] | type[DistanceConstraint] | type[FixedConstraint]] = {
+_KINDS: dict[str, type[Constraint]] = {
     "point": PointConstraint,
     "distance": DistanceConstraint,
     "fixed": FixedConstraint,
+    "beyond": BeyondConstraint,
 }
 
 

@@ -13,16 +13,14 @@ Array = NDArray[np.float64]
 
 
 class Handles:
-    """Pulls on discs of a ``radius`` in mesh units, measured along the ``edges`` (E, 2) of the mesh.
+    """Pulls on discs of a ``radius`` in mesh units, measured along the edges of the mesh (`regions.edge_lengths`).
 
     Along the edges, so that a pull on the upper lip does not take hold of the lower one.
     """
 
-    def __init__(self, rest: Array, edges: NDArray[np.integer], radius: float) -> None:
+    def __init__(self, graph: sp.csr_matrix, radius: float) -> None:
         self.radius = radius
-        apart = rest[edges[:, 0]] - rest[edges[:, 1]]
-        length = np.maximum(np.sqrt(np.sum(apart**2, axis=1)), 1e-30)
-        self._graph = sp.csr_matrix((length, (edges[:, 0], edges[:, 1])), shape=(len(rest), len(rest)))
+        self._graph = graph
         self._known: dict[int, tuple[NDArray[np.int64], Array]] = {}
 
     def pulls(self, vertices: NDArray[np.int64]) -> sp.csc_matrix:

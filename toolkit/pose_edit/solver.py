@@ -9,6 +9,8 @@ the joint problem, and a handful of them reaches its optimum.
 
 from __future__ import annotations
 
+import copy
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,9 +20,18 @@ from numpy.typing import NDArray
 from toolkit.errors import InputError
 from toolkit.mesh.topology import unique_edges
 from toolkit.pose_edit.bases_step import Responses, bases_metric
-from toolkit.pose_edit.constraints import Constraint, ConstraintRows, FixedConstraint, rows_of
+from toolkit.pose_edit.constraints import (
+    BeyondConstraint,
+    Constraint,
+    ConstraintRows,
+    FixedConstraint,
+    check_ids,
+    handled_vertices,
+    rows_of,
+)
 from toolkit.pose_edit.handles import Handles
 from toolkit.pose_edit.parameters import EditParameters
+from toolkit.pose_edit.regions import edge_lengths, vertices_beyond
 from toolkit.pose_edit.result import PoseEdit, Residual
 from toolkit.pose_edit.take import EditableTake, LowRankMoves
 from toolkit.pose_edit.weights_step import FrameRows, WeightsProblem, time_matrix
@@ -31,6 +42,8 @@ __all__ = ["PoseEditor"]
 Array = NDArray[np.float64]
 
 _MOST_HALVINGS = 8
+# Sets of held vertices whose factors are kept; one is about 200 MB at 100,000 vertices.
+_MOST_FACTORS = 2
 
 
 class PoseEditor:
@@ -44,14 +57,18 @@ class PoseEditor:
 
     def __init__(self, take: EditableTake, triangles: NDArray[np.integer]) -> None:
         self.take = take
-        edges = unique_edges(triangles)
-        self._edges = edges
-        apart = take.rest[edges[:, 0]] - take.rest[edges[:, 1]]
-        self._edge = float(np.median(np.sqrt(np.sum(apart**2, axis=1))))
+        self._graph = edge_lengths(take.rest, unique_edges(triangles))
+        self._edge = float(np.median(self._graph.data))
         self._reach = _reach(take)
-        self._responses: Responses | None = None
+        self._responses: OrderedDict[tuple[float, bytes], Responses] = OrderedDict()
         self._gram: tuple[NDArray[np.int64], Array] | None = None
         self._last: tuple[EditParameters, Array] | None = None
+
+    def following(self, take: EditableTake) -> PoseEditor:
+        """An editor of the same face after other edits; what does not depend on them is shared."""
+        other = copy.copy(self)
+        other.take, other._gram, other._last = take, None, None
+        return other
 
     def solve(
         self,
@@ -69,7 +86,8 @@ class PoseEditor:
         """
         parameters = parameters or EditParameters()
         window = parameters.frames(self.take.n_frames)
-        rows = rows_of(constraints, self.take)
+        resolved = self._with_ids(constraints)
+        rows = rows_of(resolved, self.take)
         if not len(rows):
             residuals = tuple(Residual(constraint, 0.0, 0.0) for constraint in constraints)
             return PoseEdit(self.take, self.take.weights, None, window, residuals, (0.0,))
@@ -79,7 +97,21 @@ class PoseEditor:
             change = np.maximum(self._last[1], problem.weights.lower)
         state, energies = _iterate(problem, change, parameters, progress)
         self._last = (parameters, state.change)
-        return self._result(constraints, rows, problem, state, energies)
+        residuals = self._residuals(constraints, resolved, rows, problem, state)
+        return self._result(rows, problem, state, residuals, energies)
+
+    def _with_ids(self, constraints: Sequence[Constraint]) -> list[Constraint]:
+        """The constraints with the vertices that are named by distance, one for one."""
+        found: list[Constraint] = []
+        for constraint in constraints:
+            if isinstance(constraint, BeyondConstraint):
+                start = np.asarray(constraint.vertices or handled_vertices(constraints), dtype=np.int64)
+                check_ids(start, self.take.n_vertices, "vertex")
+                ids = vertices_beyond(self.take.rest, self._graph, start, constraint.distance)
+                found.append(FixedConstraint(tuple(ids.tolist()), weight=constraint.weight))
+            else:
+                found.append(constraint)
+        return found
 
     def _problem(self, rows: ConstraintRows, parameters: EditParameters, window: tuple[int, int]) -> _Problem:
         take = self.take
@@ -117,11 +149,13 @@ class PoseEditor:
     def _respond(self, rows: ConstraintRows, handle: float) -> Array:
         """``Z`` (V, U) for the rows' vertices."""
         radius = handle * float(np.sqrt(np.sum(np.ptp(self.take.rest, axis=0) ** 2)))
-        known = self._responses
-        if known is None or known.handles.radius != radius or not np.array_equal(known.held, rows.held):
-            known = Responses(self.take.system, rows.held, Handles(self.take.rest, self._edges, radius))
-            self._responses = known
-        return known(rows.vertices)
+        key = (radius, rows.held.tobytes())
+        if key not in self._responses:
+            self._responses[key] = Responses(self.take.system, rows.held, Handles(self._graph, radius))
+        self._responses.move_to_end(key)
+        while len(self._responses) > _MOST_FACTORS:
+            self._responses.popitem(last=False)
+        return self._responses[key](rows.vertices)
 
     def _held_gram(self, held: NDArray[np.int64]) -> Array:
         """Inner products of the bases' displacements over the held vertices, ``(K, K)``."""
@@ -132,10 +166,10 @@ class PoseEditor:
 
     def _result(
         self,
-        constraints: Sequence[Constraint],
         rows: ConstraintRows,
         problem: _Problem,
         state: _State,
+        residuals: tuple[Residual, ...],
         energies: list[float],
     ) -> PoseEdit:
         last = problem.first + len(state.change) - 1
@@ -145,18 +179,29 @@ class PoseEditor:
         if problem.responses is not None:
             small = np.einsum("au,akc->ukc", rows.combination, state.row_moves)
             moves = LowRankMoves(problem.responses, small)
+        return PoseEdit(self.take, weights, moves, (problem.first, last), residuals, tuple(energies))
+
+    def _residuals(
+        self,
+        constraints: Sequence[Constraint],
+        resolved: Sequence[Constraint],
+        rows: ConstraintRows,
+        problem: _Problem,
+        state: _State,
+    ) -> tuple[Residual, ...]:
+        """One for each constraint; ``resolved`` are the same with their vertices named."""
         left = np.sqrt(np.sum(problem.residual(state) ** 2, axis=1))
         asked = np.sqrt(np.sum(problem.misfit(problem.original[rows.frames]) ** 2, axis=1))
         residuals = []
-        for index, constraint in enumerate(constraints):
+        for index, (constraint, named) in enumerate(zip(constraints, resolved, strict=True)):
             mine = rows.owners == index
-            if isinstance(constraint, FixedConstraint) and constraint.frames is None:
-                residuals.append(Residual(constraint, self._held_motion(constraint, state.change), 0.0))
+            if isinstance(named, FixedConstraint) and named.frames is None:
+                residuals.append(Residual(constraint, self._held_motion(named, state.change), 0.0))
             else:
                 residuals.append(
                     Residual(constraint, float(left[mine].max(initial=0)), float(asked[mine].max(initial=0)))
                 )
-        return PoseEdit(self.take, weights, moves, (problem.first, last), tuple(residuals), tuple(energies))
+        return tuple(residuals)
 
     def _held_motion(self, constraint: FixedConstraint, change: Array) -> float:
         ids = np.asarray(constraint.vertices, dtype=np.int64)

@@ -70,6 +70,11 @@ class Shot:
         return self.path / "feature_lines.json"
 
     @property
+    def edits_path(self) -> Path:
+        """``edits.jsonl``, the journal of edits."""
+        return self.path / "edits.jsonl"
+
+    @property
     def frames_path(self) -> Path:
         """``result/frames.npy`` (T, V, 3) float32, in the target's unit and place."""
         return self.path / "result" / "frames.npy"

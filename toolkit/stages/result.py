@@ -8,6 +8,7 @@ import numpy as np
 
 from toolkit.blocks import block_size, map_blocks
 from toolkit.coating_details import CoatingDetails
+from toolkit.decomposition import Decomposer
 from toolkit.details import Reconstruction
 from toolkit.progress import Progress
 from toolkit.shot import Shot, StageFolder
@@ -40,9 +41,9 @@ def _open_blocks(shot_path: Path, written: Path) -> Fill:
     return fill
 
 
-def open_reconstruction(shot: Shot) -> Reconstruction:
-    """What builds any frame of the result on demand."""
-    target = target_decomposer(shot)
+def open_reconstruction(shot: Shot, target: Decomposer | None = None) -> Reconstruction:
+    """What builds any frame of the unedited result on demand; ``target`` if it is decomposed already."""
+    target = target or target_decomposer(shot)
     gain = np.array(shot.array("transfer", "gain"))
     coating = None
     if shot.config.details.method == "coating":

@@ -16,32 +16,20 @@ from toolkit.stages.inputs import load_lines, load_mesh
 from toolkit.stages.register import load_target
 from toolkit.transfer import DeformationTransfer, triangle_weights
 
-__all__ = ["target_decomposer", "work"]
+__all__ = ["open_system", "target_decomposer", "work"]
 
 
 def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     """Factorise once, solve for all bases."""
-    source = load_mesh(shot, "source")
-    smooth = np.array(shot.array("decompose", "rest_smooth"))
     target = target_decomposer(shot)
-    pairs = load_pairs(shot)
     frames = np.array(shot.array("bases", "frames"))
-    deltas, details = shot.array("decompose", "smooth_deltas"), shot.array("decompose", "details")
-    shapes = smooth + deltas[frames]
-    motion = _motion(deltas)
-    weights = triangle_weights(smooth, shapes, source.triangles) if shot.config.transfer.robust else None
+    details = shot.array("decompose", "details")
+    shapes = _shapes(shot)
+    motion = _motion(shot.array("decompose", "smooth_deltas"))
     progress("factorising", 0, 1)
-    system = DeformationTransfer(
-        smooth,
-        target.rest.smooth,
-        source.triangles,
-        motion,
-        line_edges(load_lines(shot)),
-        pairs,
-        shot.config.transfer,
-        weights,
-    )
+    system = _system(shot, target, shapes, motion)
     progress("factorising", 1, 1)
+    source, pairs, smooth = load_mesh(shot, "source"), load_pairs(shot), system.source
     gain = detail_gain(shot.config.details, smooth, target.rest.smooth, source.triangles)
     gaps = np.array(shot.array("bases", "pair_gaps"))[1:][frames]
     contact_map = ContactMap(pairs, source.vertices, target.mesh.vertices)
@@ -57,10 +45,36 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     }
 
 
+def open_system(shot: Shot, target: Decomposer) -> DeformationTransfer:
+    """The system that the finished stage solved, factorised again: what edits of poses need."""
+    return _system(shot, target, _shapes(shot), np.array(shot.array("transfer", "motion")))
+
+
 def target_decomposer(shot: Shot) -> Decomposer:
     """The target's smoothing and local frames, with the source's strength and frame neighbours."""
     strength = shot.config.smoothing.resolved(load_mesh(shot, "source"))
     return Decomposer(load_target(shot), strength, np.array(shot.array("decompose", "neighbour")))
+
+
+def _shapes(shot: Shot) -> np.ndarray:
+    """The source's smoothed shapes in the frames that are bases, ``(K, V, 3)``."""
+    smooth, frames = np.array(shot.array("decompose", "rest_smooth")), np.array(shot.array("bases", "frames"))
+    return np.asarray(smooth + shot.array("decompose", "smooth_deltas")[frames])
+
+
+def _system(shot: Shot, target: Decomposer, shapes: np.ndarray, motion: np.ndarray) -> DeformationTransfer:
+    smooth, triangles = np.array(shot.array("decompose", "rest_smooth")), target.mesh.triangles
+    weights = triangle_weights(smooth, shapes, triangles) if shot.config.transfer.robust else None
+    return DeformationTransfer(
+        smooth,
+        target.rest.smooth,
+        triangles,
+        motion,
+        line_edges(load_lines(shot)),
+        load_pairs(shot),
+        shot.config.transfer,
+        weights,
+    )
 
 
 def _motion(deltas: np.ndarray) -> np.ndarray:

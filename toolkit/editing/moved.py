@@ -1,0 +1,65 @@
+"""How far edits move each frame: what a timeline marks and the report shows."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolkit.blocks import block_ranges, block_size
+from toolkit.editing.stack import State
+
+__all__ = ["moved_by"]
+
+Array = NDArray[np.float64]
+
+_SAMPLES = 3000
+
+
+def moved_by(state: State) -> Array:
+    """The largest displacement of each frame, ``(T,)``, in the result's unit.
+
+    Of the large-scale shape at some thousand vertices, those where an edit takes hold among them, and of the details
+    at all vertices; the larger of the two.
+    """
+    return np.maximum(_large_scale(state), _details(state)) * state.opened.placement.scale
+
+
+def _large_scale(state: State) -> Array:
+    before, after = state.opened.take, state.take
+    if after.weights is before.weights and not after.edits:
+        return np.zeros(before.n_frames)
+    ids = np.linspace(0, before.n_vertices - 1, min(_SAMPLES, before.n_vertices)).astype(np.int64)
+    peaks = [np.abs(edit.responses).argmax(axis=0) for edit in after.edits]
+    ids = np.unique(np.concatenate([ids, *peaks]))
+    plain = before.moves_at(ids).reshape(before.n_bases, -1)
+    edited = after.moves_at(ids).reshape(before.n_bases, -1)
+    farthest = np.empty(before.n_frames)
+    for start, stop in block_ranges(before.n_frames, 256):
+        apart = after.weights[start:stop] @ edited - before.weights[start:stop] @ plain
+        squared = np.sum(apart.reshape(stop - start, -1, 3) ** 2, axis=2)
+        farthest[start:stop] = np.sqrt(squared.max(axis=1, initial=0))
+    return farthest
+
+
+def _details(state: State) -> Array:
+    opened = state.opened
+    farthest = np.zeros(opened.take.n_frames)
+    if not state.changes:
+        return farthest
+    own = opened.target.rest.detail
+    static = np.array(own)
+    for change in state.changes:
+        change.apply_static(static)
+    farthest += np.sqrt(np.sum((static - own) ** 2, axis=1).max())
+    first = max(min(change.window[0] for change in state.changes), 0)
+    last = min(max(change.window[1] for change in state.changes), len(farthest) - 1)
+    gain = opened.gain.astype(np.float32)[:, None]
+    for start, stop in block_ranges(last + 1 - first, block_size(len(own))):
+        plain = opened.details[first + start : first + stop] * gain
+        changed = plain.copy()
+        for change in state.changes:
+            if change.window[0] < first + stop and change.window[1] >= first + start:
+                change.apply(changed, first + start)
+        squared = np.sum((changed - plain) ** 2, axis=2)
+        farthest[first + start : first + stop] += np.sqrt(squared.max(axis=1))
+    return farthest

@@ -1,0 +1,39 @@
+"""Regions of the face that an edit names by distance."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+
+from toolkit.errors import InputError
+
+__all__ = ["edge_lengths", "vertices_beyond"]
+
+Array = NDArray[np.float64]
+Ids = NDArray[np.int64]
+
+
+def edge_lengths(vertices: Array, edges: NDArray[np.integer]) -> sp.csr_matrix:
+    """The mesh as a graph: lengths of its edges (E, 2), each given once, ``(V, V)``."""
+    apart = vertices[edges[:, 0]] - vertices[edges[:, 1]]
+    length = np.maximum(np.sqrt(np.sum(apart**2, axis=1)), 1e-30)
+    return sp.csr_matrix((length, (edges[:, 0], edges[:, 1])), shape=(len(vertices), len(vertices)))
+
+
+def vertices_beyond(vertices: Array, graph: sp.csr_matrix, start: NDArray[np.integer], distance: float) -> Ids:
+    """Vertices farther than ``distance`` from the ``start`` vertices, sorted.
+
+    Along the edges of the mesh (`edge_lengths`), so that the upper lip is far from the lower one; parts that no edges
+    join to the start, as eyes and teeth, as the crow flies.
+    """
+    start = np.unique(np.asarray(start, dtype=np.int64))
+    if not len(start):
+        raise InputError("nothing says from where the distance counts", remedy="give vertices, or points to move")
+    along = dijkstra(graph, directed=False, indices=start, min_only=True)
+    apart = np.flatnonzero(np.isinf(along))
+    if len(apart):
+        along[apart] = cKDTree(vertices[start]).query(vertices[apart])[0]
+    return np.flatnonzero(along > distance)
