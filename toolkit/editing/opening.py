@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from toolkit.decomposition import Decomposer
 from toolkit.details import Reconstruction
+from toolkit.editing.details import DetailSolver, detail_take
 from toolkit.editing.placement import Placement
 from toolkit.errors import InputError
 from toolkit.pose_edit import EditableTake
@@ -30,7 +31,8 @@ class OpenedTake:
     """The unedited take of a shot, in the pose of the bases, and what turns it into frames of the result.
 
     ``target`` the decomposed target, ``details`` (T, V, 3) the source's motion details, memory-mapped, ``gain`` (V,)
-    their factor, ``reconstruction`` what builds frames, ``take`` what edits of poses change.
+    their factor, ``reconstruction`` what builds frames, ``take`` what edits of poses change, ``detail_solver`` what
+    solves edits of details.
     """
 
     target: Decomposer
@@ -39,6 +41,7 @@ class OpenedTake:
     reconstruction: Reconstruction
     take: EditableTake
     placement: Placement
+    detail_solver: DetailSolver
     by_coating: bool
 
 
@@ -61,12 +64,14 @@ def open_take(shot: Shot, progress: Progress = silent) -> OpenedTake:
     weights = np.array(shot.array("bases", "weights"), dtype=np.float64)
     take = EditableTake(rest, bases - rest, weights, open_system(shot, target))
     progress("opening the shot", 3, 3)
+    details = detail_take(shot, target)
     return OpenedTake(
         target,
-        shot.array("decompose", "details"),
-        np.array(shot.array("transfer", "gain")),
+        details.details,
+        details.gain,
         reconstruction,
         take,
         Placement(load_pose(shot), load_motion(shot)),
+        DetailSolver(shot, details),
         shot.config.details.method == "coating",
     )

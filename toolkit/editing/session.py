@@ -5,26 +5,39 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.details import DetailsChange
+from toolkit.detail_edit import DetailChange, DetailEdit, DetailTake
+from toolkit.detail_edit import to_data as detail_data
+from toolkit.editing.applied import applied
 from toolkit.editing.moved import moved_by
 from toolkit.editing.opening import open_take
 from toolkit.editing.stack import EditStack, Layer, State
 from toolkit.errors import InputError
-from toolkit.pose_edit import Constraint, EditParameters, PoseEdit, Residual, to_data
+from toolkit.pose_edit import Constraint, EditParameters, PoseEdit, Residual
+from toolkit.pose_edit import to_data as pose_data
 from toolkit.progress import Progress, silent
 from toolkit.shot import Shot
 from toolkit.shot.journal import Edit, Journal, Step
+from toolkit.stages import current_key, result, stage_parameters
 from toolkit.stages.inputs import load_sequence
 
 __all__ = ["EditSession"]
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Draft:
+    """An edit that is tried: its ``kind`` and ``data`` for the journal, and the ``state`` that it makes."""
+
+    kind: str
+    data: dict[str, Any]
+    state: State
 
 
 class EditSession:
@@ -42,7 +55,7 @@ class EditSession:
         self._sequence = load_sequence(shot)
         self.fps = float(self._sequence.fps or 30.0)
         self.rest: Array = np.array(shot.array("register", "target_vertices"))
-        self._draft: tuple[State, PoseEdit | DetailsChange, dict[str, Any], str] | None = None
+        self._draft: _Draft | None = None
         self._moved: tuple[State, Array] | None = None
         self._refresh(progress)
 
@@ -140,17 +153,24 @@ class EditSession:
         """
         parameters = parameters or EditParameters()
         with self._lock:
-            data = _plain(to_data(constraints, parameters))
+            data = _plain(pose_data(constraints, parameters))
             solved = self._stack.solve_pose(self._committed, constraints, parameters, warm=warm, progress=progress)
-            self._draft = (self._stack.after_pose(self._committed, solved), solved, data, "pose")
+            self._draft = _Draft("pose", data, self._stack.after_pose(self._committed, solved))
             return solved
 
-    def draft_detail(self, edit: Any) -> DetailsChange:
+    def draft_detail(self, edit: DetailEdit) -> DetailChange:
         """Try a detail edit (`toolkit.detail_edit`) on top of the committed ones, as `draft_pose`."""
         with self._lock:
             change = self._stack.solve_detail(self._committed, edit)
-            self._draft = (self._stack.after_detail(self._committed, change), change, _plain(edit.to_data()), "detail")
+            state = self._stack.after_detail(self._committed, change)
+            self._draft = _Draft("detail", _plain(detail_data(edit)), state)
             return change
+
+    @property
+    def detail_take(self) -> DetailTake:
+        """The details with all committed edits, to select and to measure on; in the pose and size of the bases."""
+        with self._lock:
+            return self._stack.opened.detail_solver.take.changed(*self._committed.changes)
 
     def drop_draft(self) -> None:
         """Forget the draft."""
@@ -165,8 +185,8 @@ class EditSession:
         with self._lock:
             if self._draft is None:
                 raise InputError("there is no draft to commit", remedy="make one with draft_pose or draft_detail")
-            _, _, data, kind = self._draft
-            return self.add(kind, {**data, "note": note} if note else data, progress)
+            data = self._draft.data | ({"note": note} if note else {})
+            return self.add(self._draft.kind, data, progress)
 
     def add(self, kind: str, data: dict[str, Any], progress: Progress = silent) -> Edit:
         """Commit an edit given as data, as the journal holds it: ``kind`` "pose" or "detail"; drops the draft."""
@@ -237,18 +257,25 @@ class EditSession:
         layer = self._layer(number)
         return layer.problem if layer is not None else None
 
-    def solved(self, number: int) -> PoseEdit | DetailsChange | None:
+    def solved(self, number: int) -> PoseEdit | DetailChange | None:
         """What the solver found for an active edit."""
         layer = self._layer(number)
         return layer.solved if layer is not None else None
 
     def write_result(self, progress: Progress = silent) -> None:
-        """Write the stage "result" with the committed edits."""
-        raise NotImplementedError
+        """Write the stage "result" with the committed edits, if it is not up to date already."""
+        with self._lock:
+            self._follow()
+            key = current_key(self.shot, "result")
+            if self.shot.is_current("result", key):
+                return
+            edits = applied(self.shot, self._stack, self._layers)
+            with self.shot.write_stage("result", key, stage_parameters(self.shot, "result")) as folder:
+                result.work(self.shot, folder, progress, edits=edits)
 
     @property
     def _state(self) -> State:
-        return self._draft[0] if self._draft is not None else self._committed
+        return self._draft.state if self._draft is not None else self._committed
 
     def _layer(self, number: int) -> Layer | None:
         with self._lock:
@@ -257,12 +284,15 @@ class EditSession:
             return next((layer for layer in self._layers if layer.edit.number == number), None)
 
     def _refresh(self, progress: Progress = silent) -> None:
-        """Follow the journal."""
+        """Follow the journal and drop the draft."""
+        self._follow(progress)
+        self._draft = None
+
+    def _follow(self, progress: Progress = silent) -> None:
         self._replay = self._journal.replay()
         self._kinds = {edit.number: edit.kind for edit in self._replay.edits}
         self._layers = self._stack.layers(self._replay.active, progress)
         self._committed = self._layers[-1].state if self._layers else self._stack.base
-        self._draft = None
 
     def _check_frame(self, t: int) -> None:
         if not 0 <= t < self.n_frames:

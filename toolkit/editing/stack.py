@@ -9,16 +9,16 @@ from __future__ import annotations
 import json
 import logging
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.details import DetailsChange, Reconstruction
-from toolkit.editing.details import solve_detail
+from toolkit.detail_edit import DetailChange, DetailEdit
+from toolkit.details import Reconstruction
 from toolkit.editing.opening import OpenedTake
 from toolkit.editing.visible import CoatingOffsets
 from toolkit.errors import InputError
@@ -35,11 +35,13 @@ from toolkit.pose_edit import (
 from toolkit.progress import Progress, silent
 from toolkit.shot.journal import Edit
 
-__all__ = ["EditStack", "Layer", "State", "without_note"]
+__all__ = ["EditStack", "Layer", "State"]
 
 log = logging.getLogger(__name__)
 
 _MOST_LAYERS = 64
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +50,7 @@ class State:
 
     opened: OpenedTake
     take: EditableTake
-    changes: tuple[DetailsChange, ...] = ()
+    changes: tuple[DetailChange, ...] = ()
 
     @cached_property
     def reconstruction(self) -> Reconstruction:
@@ -67,7 +69,7 @@ class State:
         return bool(
             (weights != self.opened.take.weights[t]).any()
             or any(np.einsum("k,ukc->uc", weights, edit.coefficients).any() for edit in self.take.edits)
-            or any(change.window[0] <= t <= change.window[1] for change in self.changes)
+            or any(change.touches(t) for change in self.changes)
             or self._static_changes
         )
 
@@ -87,7 +89,7 @@ class Layer:
     edit: Edit
     state: State
     residuals: tuple[Residual, ...] = ()
-    solved: Any = None
+    solved: PoseEdit | DetailChange | None = None
     problem: str | None = None
 
 
@@ -101,6 +103,8 @@ class EditStack:
         self.base = self._seen(State(opened, opened.take))
         self._editor = PoseEditor(self.base.take, triangles)
         self._layers: OrderedDict[tuple[str, ...], Layer] = OrderedDict()
+        # Details live in local frames: what an edit of theirs does depends on no pose.
+        self._changes: OrderedDict[tuple[str, ...], DetailChange] = OrderedDict()
 
     def layers(self, edits: Sequence[Edit], progress: Progress = silent, *, strict: bool = False) -> list[Layer]:
         """One layer for each edit, in order. An edit that cannot be applied is passed over, or with ``strict`` raised.
@@ -109,16 +113,16 @@ class EditStack:
         """
         found: list[Layer] = []
         key: tuple[str, ...] = ()
+        details: tuple[str, ...] = ()
         for edit in edits:
-            key = (*key, json.dumps([edit.kind, without_note(edit.data)], sort_keys=True))
+            word = json.dumps([edit.kind, _without_note(edit.data)], sort_keys=True)
+            key = (*key, word)
+            details = (*details, word) if edit.kind == "detail" else details
             layer = self._layers.get(key)
             if layer is None or (strict and layer.problem is not None):
-                layer = self._solve(edit, found[-1].state if found else self.base, progress, strict)
-                self._layers[key] = layer
-            self._layers.move_to_end(key)
+                layer = self._solve(edit, found[-1].state if found else self.base, details, progress, strict)
+            _keep(self._layers, key, layer)
             found.append(replace(layer, edit=edit))
-        while len(self._layers) > _MOST_LAYERS:
-            self._layers.popitem(last=False)
         return found
 
     def solve_pose(
@@ -142,22 +146,24 @@ class EditStack:
         """The state after a pose edit."""
         return self._seen(State(self.opened, edit.take, state.changes))
 
-    def solve_detail(self, state: State, data: Any) -> DetailsChange:
-        """Solve a detail edit on a state; ``data`` as in the journal, or the edit itself."""
-        return solve_detail(data, self.opened, state.changes)
+    def solve_detail(self, state: State, edit: DetailEdit | Mapping[str, Any]) -> DetailChange:
+        """Solve a detail edit on a state, given as such or as in the journal."""
+        return self.opened.detail_solver.solve(edit, state.changes)
 
-    def after_detail(self, state: State, change: DetailsChange) -> State:
+    def after_detail(self, state: State, change: DetailChange) -> State:
         """The state after a detail edit."""
         return self._seen(State(self.opened, state.take, (*state.changes, change)))
 
-    def _solve(self, edit: Edit, state: State, progress: Progress, strict: bool) -> Layer:
+    def _solve(self, edit: Edit, state: State, details: tuple[str, ...], progress: Progress, strict: bool) -> Layer:
+        """``details`` tells the detail edits up to this one."""
         try:
             if edit.kind == "pose":
                 constraints, parameters = from_data(edit.data)
                 solved = self.solve_pose(state, constraints, parameters, progress=progress)
                 return Layer(edit, self.after_pose(state, solved), solved.residuals, solved)
             if edit.kind == "detail":
-                change = self.solve_detail(state, edit.data)
+                change = self._changes.get(details) or self.solve_detail(state, edit.data)
+                _keep(self._changes, details, change)
                 return Layer(edit, self.after_detail(state, change), (), change)
             raise InputError(f'an edit of the kind "{edit.kind}" is unknown', remedy="a newer version may have made it")
         except InputError as error:
@@ -176,6 +182,13 @@ class EditStack:
         )
 
 
-def without_note(data: dict[str, Any]) -> dict[str, Any]:
+def _keep(kept: OrderedDict[tuple[str, ...], T], key: tuple[str, ...], value: T) -> None:
+    kept[key] = value
+    kept.move_to_end(key)
+    while len(kept) > _MOST_LAYERS:
+        kept.popitem(last=False)
+
+
+def _without_note(data: dict[str, Any]) -> dict[str, Any]:
     """An edit's data without the user's note on it, which changes nothing."""
     return {name: value for name, value in data.items() if name != "note"}

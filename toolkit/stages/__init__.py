@@ -3,6 +3,6 @@
 `run_stages` runs them in order and skips what is up to date. A stage knows the stage before it only by its arrays.
 """
 
-from toolkit.stages.run import STAGES, StageReport, current_key, run_stages
+from toolkit.stages.run import STAGES, StageReport, current_key, run_stages, stage_parameters
 
-__all__ = ["STAGES", "StageReport", "current_key", "run_stages"]
+__all__ = ["STAGES", "StageReport", "current_key", "run_stages", "stage_parameters"]

@@ -25,7 +25,7 @@ def load_performance(shot: Shot) -> Performance:
     """The retargeted performance, frames memory-mapped, in the target's unit and place.
 
     The morphs are whole frames of the result, those that were chosen as bases, with the head's motion taken out: a glTF
-    then carries the wrinkles of these frames, too.
+    then carries the wrinkles of these frames, too. After edits they are the edited bases with the same frames' details.
     """
     if not shot.is_current("result", current_key(shot, "result")):
         raise InputError(
@@ -37,7 +37,9 @@ def load_performance(shot: Shot) -> Performance:
     frames = shot.array("result", "frames")
     motion = load_motion(shot).seen_from(load_pose(shot))
     chosen = np.array(shot.array("bases", "frames"))
-    placed = frames[chosen].astype(np.float64) - motion.translations[chosen][:, None]
+    edited = "weights" in (shot.manifest("result") or {})["arrays"]
+    shapes = shot.array("result", "morphs") if edited else frames[chosen]
+    placed = shapes.astype(np.float64) - motion.translations[chosen][:, None]
     fps = (shot.manifest("inputs") or {}).get("numbers", {}).get("fps")
     if fps is None:
         log.warning("the take says no frame rate; %g frames a second are assumed (fps in shot.toml)", _USUAL_FPS)
@@ -46,7 +48,7 @@ def load_performance(shot: Shot) -> Performance:
         polygons=source.polygons,
         rest=np.array(shot.array("register", "target_vertices")),
         morphs=np.einsum("kji,kvj->kvi", motion.rotations[chosen], placed),
-        weights=np.array(shot.array("bases", "weights")),
+        weights=np.array(shot.array("result" if edited else "bases", "weights")),
         rotations=motion.rotations,
         translations=motion.translations,
         read=lambda start, stop: np.array(frames[start:stop]),

@@ -16,7 +16,7 @@ from toolkit.shot.hashing import key_of
 from toolkit.stages import bases, decompose, inputs, register, result, transfer
 from toolkit.stages.blocks import MapBlocks
 
-__all__ = ["STAGES", "Stage", "StageReport", "current_key", "run_stages"]
+__all__ = ["STAGES", "Stage", "StageReport", "current_key", "run_stages", "stage_parameters"]
 
 log = logging.getLogger(__name__)
 
@@ -102,12 +102,23 @@ def current_key(shot: Shot, name: str) -> str:
     parts["after"] = {earlier: current_key(shot, earlier) for earlier in stage.after}
     if stage.reads and shot.is_current("inputs", parts["after"]["inputs"]):
         parts["after"]["inputs"] = _contents(shot, stage.reads)
-    parts["parameters"] = _parameters(shot, stage)
+    parts["parameters"] = stage_parameters(shot, stage.name)
     if name == "inputs":
         parts["files"] = {label: shot.hashes.of(path) for label, path in inputs.files(shot).items()}
         # Formats without a frame rate take it from here; the frames themselves do not depend on it.
         parts["fps"] = shot.config.source.fps
+    if name == "result" and (edits := result.active_edits(shot)):
+        parts["edits"] = [[edit.number, edit.kind, _edit_parts(shot, edit.data)] for edit in edits]
     return key_of(parts)
+
+
+def _edit_parts(shot: Shot, data: dict[str, Any]) -> dict[str, Any]:
+    """An edit without its note, and with the key of the shot that it copies from."""
+    parts = {name: value for name, value in data.items() if name != "note"}
+    other = shot.path / str(data.get("source_shot", ""))
+    if "source_shot" in data and (other / "shot.toml").exists():
+        parts["source_key"] = current_key(Shot(other), "transfer")
+    return parts
 
 
 def _contents(shot: Shot, names: Sequence[str]) -> dict[str, str]:
@@ -124,15 +135,16 @@ def _run(shot: Shot, stage: Stage, force: bool, progress: Progress, map_blocks: 
         return StageReport(stage.name, True, 0.0, manifest.get("numbers", {}))
     log.info("%s: running", stage.name)
     began = time.perf_counter()
-    with shot.write_stage(stage.name, key, _parameters(shot, stage)) as folder:
+    with shot.write_stage(stage.name, key, stage_parameters(shot, stage.name)) as folder:
         stage.work(shot, folder, progress, **({"map_blocks": map_blocks} if stage.by_frames else {}))
     seconds = time.perf_counter() - began
     log.info("%s: done in %.1f s", stage.name, seconds)
     return StageReport(stage.name, False, seconds, folder.numbers)
 
 
-def _parameters(shot: Shot, stage: Stage) -> dict[str, Any]:
-    return {table: asdict(getattr(shot.config, table)) for table in stage.tables}
+def stage_parameters(shot: Shot, name: str) -> dict[str, Any]:
+    """The tables of parameters that a stage depends on."""
+    return {table: asdict(getattr(shot.config, table)) for table in STAGES[name].tables}
 
 
 def _with_earlier(names: Sequence[str]) -> set[str]:
