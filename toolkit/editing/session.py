@@ -33,11 +33,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class _Draft:
-    """An edit that is tried: its ``kind`` and ``data`` for the journal, and the ``state`` that it makes."""
+    """An edit that is tried: its ``kind`` and ``data`` for the journal, and the ``state`` that it makes.
+
+    ``instead_of`` is the number of the committed edit that it would change.
+    """
 
     kind: str
     data: dict[str, Any]
     state: State
+    instead_of: int | None = None
 
 
 class EditSession:
@@ -133,6 +137,22 @@ class EditSession:
             return _in_words(self._replay.redo, self._kinds)
 
     @property
+    def state(self) -> State:
+        """What builds frames with every active edit and the draft. It never changes, so it needs no lock later."""
+        with self._lock:
+            return self._state
+
+    @property
+    def unedited_state(self) -> State:
+        """What builds frames of the automatic result."""
+        return self._stack.base
+
+    def committed_state(self, without: int | None = None) -> State:
+        """What builds frames with the committed edits, or with all of them but one: what a draft starts from."""
+        with self._lock:
+            return self._without(without)
+
+    @property
     def has_draft(self) -> bool:
         """Whether a draft is open."""
         with self._lock:
@@ -144,26 +164,30 @@ class EditSession:
         parameters: EditParameters | None = None,
         *,
         warm: bool = True,
+        instead_of: int | None = None,
         progress: Progress = silent,
     ) -> PoseEdit:
         """Try a pose edit on top of the committed ones: `frame` shows it, nothing is written.
 
         It takes the place of an open draft. ``warm`` begins from the last draft's solution, for dragging. The residuals
-        are in the result's unit. An error or a cancel leaves the draft that was.
+        are in the result's unit. An error or a cancel leaves the draft that was. ``instead_of`` tries a change of a
+        committed edit: it is left out of those below, and `commit` changes it in its place.
         """
         parameters = parameters or EditParameters()
         with self._lock:
             data = _plain(pose_data(constraints, parameters))
-            solved = self._stack.solve_pose(self._committed, constraints, parameters, warm=warm, progress=progress)
-            self._draft = _Draft("pose", data, self._stack.after_pose(self._committed, solved))
+            base = self._without(instead_of)
+            solved = self._stack.solve_pose(base, constraints, parameters, warm=warm, progress=progress)
+            self._draft = _Draft("pose", data, self._stack.after_pose(base, solved), instead_of)
             return solved
 
-    def draft_detail(self, edit: DetailEdit) -> DetailChange:
+    def draft_detail(self, edit: DetailEdit, *, instead_of: int | None = None) -> DetailChange:
         """Try a detail edit (`toolkit.detail_edit`) on top of the committed ones, as `draft_pose`."""
         with self._lock:
-            change = self._stack.solve_detail(self._committed, edit)
-            state = self._stack.after_detail(self._committed, change)
-            self._draft = _Draft("detail", _plain(detail_data(edit)), state)
+            base = self._without(instead_of)
+            change = self._stack.solve_detail(base, edit)
+            state = self._stack.after_detail(base, change)
+            self._draft = _Draft("detail", _plain(detail_data(edit)), state, instead_of)
             return change
 
     @property
@@ -185,8 +209,12 @@ class EditSession:
         with self._lock:
             if self._draft is None:
                 raise InputError("there is no draft to commit", remedy="make one with draft_pose or draft_detail")
-            data = self._draft.data | ({"note": note} if note else {})
-            return self.add(self._draft.kind, data, progress)
+            draft = self._draft
+            data = draft.data | ({"note": note} if note else {})
+            if draft.instead_of is None:
+                return self.add(draft.kind, data, progress)
+            self.change(draft.instead_of, data, progress)
+            return next(edit for edit in self._replay.edits if edit.number == draft.instead_of)
 
     def add(self, kind: str, data: dict[str, Any], progress: Progress = silent) -> Edit:
         """Commit an edit given as data, as the journal holds it: ``kind`` "pose" or "detail"; drops the draft."""
@@ -276,6 +304,12 @@ class EditSession:
     @property
     def _state(self) -> State:
         return self._draft.state if self._draft is not None else self._committed
+
+    def _without(self, number: int | None) -> State:
+        if number is None:
+            return self._committed
+        others = self._stack.layers([edit for edit in self._replay.active if edit.number != number])
+        return others[-1].state if others else self._stack.base
 
     def _layer(self, number: int) -> Layer | None:
         with self._lock:
