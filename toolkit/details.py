@@ -127,7 +127,8 @@ class Reconstruction:
         self._rest = (smooth - self._origin)[order].astype(np.float32)
         moves = (bases - smooth)[:, order]  # (K, V, 3)
         self._moves = np.ascontiguousarray(moves.reshape(len(bases), -1).T, dtype=np.float32)
-        self._own = self._detail = target.rest.detail[order].astype(np.float32)
+        self._own = target.rest.detail[order].astype(np.float32)
+        self._own_change = np.zeros_like(self._own)
         self._gain_of = np.asarray(gain, dtype=np.float32)
         self._gain = self._gain_of[order]
         self._rotations, self._translations = _placed(motion, pose, self._origin)
@@ -155,8 +156,7 @@ class Reconstruction:
         static = np.array(self._target.rest.detail)
         for change in details:
             change.apply_static(static)
-        changed = static[self._order].astype(np.float32)
-        other._detail = self._own if np.array_equal(changed, self._own) else changed
+        other._own_change = (static - self._target.rest.detail)[self._order].astype(np.float32)
         return other
 
     def frames(self, start: int, stop: int, details: NDArray[np.float32], out: NDArray[np.float32]) -> None:
@@ -191,28 +191,26 @@ class Reconstruction:
         self, points: NDArray[np.float32], details: NDArray[np.float32], start: int, stop: int
     ) -> NDArray[np.float32]:
         """What details add to the large-scale ``points``, edits included, ``(V, 3, B)``."""
-        changed, scratch = self._changed(details, start, stop), np.empty_like(points)
-        if changed is None:
-            shift = self._rotated(points, details, self._gain, self._detail, scratch)
-        else:
-            shift = self._rotated(points, changed, np.ones_like(self._gain), self._detail, scratch)
-        if self._coating is None:
-            return shift
-        if changed is None and self._detail is self._own:
-            return self._coating.displacement(points, shift, start, stop)
-        # An edit is a displacement here, too: as a coating it would leak out of its region.
-        plain = self._rotated(points, details, self._gain, self._own, scratch)
-        return shift + (self._coating.displacement(points, plain, start, stop) - plain)
+        scratch = np.empty_like(points)
+        shift = self._rotated(points, details, self._gain, self._own, scratch)
+        if self._coating is not None:
+            shift = self._coating.displacement(points, shift, start, stop)
+        change = self._change(details, start, stop)
+        if change is not None:
+            # A displacement of its own, so that what it leaves alone stays bit for bit; as a coating it would leak.
+            shift += self._rotated(points, change, np.ones_like(self._gain), self._own_change, scratch)
+        return shift
 
-    def _changed(self, details: NDArray[np.float32], start: int, stop: int) -> NDArray[np.float32] | None:
-        """Scaled details (B, V, 3) with the edits of these frames; None where there are none."""
+    def _change(self, details: NDArray[np.float32], start: int, stop: int) -> NDArray[np.float32] | None:
+        """What edits add to the scaled details of these frames, (B, V, 3); None where they add nothing at all."""
         acting = [c for c in self._details_changes if c.window[0] < stop and c.window[1] >= start]
         if not acting:
-            return None
-        scaled = details * self._gain_of[:, None]
+            return np.zeros_like(details) if self._own_change.any() else None
+        plain = details * self._gain_of[:, None]
+        changed = plain.copy()
         for change in acting:
-            change.apply(scaled, start)
-        return scaled
+            change.apply(changed, start)
+        return np.asarray(changed - plain)
 
     def _rotated(
         self,
