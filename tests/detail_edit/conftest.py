@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ KEY = 30
 
 
 def sheet(n: int, m: int, height: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """A sheet over [-1, 1] x [-1.2, 1.2], unevenly spaced, domed by ``height``; normals towards +z."""
+    """A sheet over [-1, 1] x [-1.2, 1.2], unevenly spaced, domed by ``height``, higher below; normals towards +z."""
     i, j = np.meshgrid(np.arange(n - 1), np.arange(m - 1), indexing="ij")
     a = (i * m + j).ravel()
     b, c, d = a + m, a + m + 1, a + 1
@@ -20,7 +22,9 @@ def sheet(n: int, m: int, height: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     u, v = (x.ravel() for x in np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1.2, 1.2, m), indexing="ij"))
     rng = np.random.default_rng(5)
     u, v = u + rng.uniform(-0.1, 0.1, n * m) / n, v + rng.uniform(-0.1, 0.1, n * m) / m
-    return np.column_stack([u, v, height * np.exp(-(u**2) - v**2)]), triangles
+    return np.column_stack(
+        [u, v, height * (np.exp(-(u**2) - v**2) + 0.4 * np.exp(-8 * (u**2 + (v + 0.6) ** 2)))]
+    ), triangles
 
 
 def wrinkle(points: np.ndarray, across: float, along: float, width: float = 0.05) -> np.ndarray:
@@ -52,3 +56,8 @@ def take() -> DetailTake:
     static = 0.001 * rng.standard_normal((len(points), 3))
     gain = 1 + 0.2 * points[:, 0]
     return DetailTake(TriangleMesh(points, triangles), points, neighbour, frames, details, gain, static)
+
+
+@pytest.fixture(scope="session")
+def groove() -> Callable[..., np.ndarray]:
+    return wrinkle

@@ -134,7 +134,7 @@ def test_blocks_and_single_vertices_are_edited_alike(take: DetailTake) -> None:
 
 def test_a_gain_weakens_the_whole_take(take: DetailTake) -> None:
     before, after = _edited(take, solve_detail_edit(GainEdit(gains=((0, 0.4),)), take))
-    assert after == pytest.approx(0.4 * before, abs=1e-9)
+    assert np.abs(after - 0.4 * before).max() < 1e-8
 
 
 def test_a_gain_curve_goes_through_its_points_in_its_region(take: DetailTake) -> None:

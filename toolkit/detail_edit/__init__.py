@@ -14,6 +14,7 @@ What the user commits goes to the journal as `to_data(edit)`, and comes back by 
 """
 
 from toolkit.detail_edit.change import DetailChange
+from toolkit.detail_edit.curves import drawn, snapped
 from toolkit.detail_edit.data import (
     curve_from_data,
     curve_to_data,
@@ -23,6 +24,7 @@ from toolkit.detail_edit.data import (
     to_data,
 )
 from toolkit.detail_edit.edits import DetailEdit, GainEdit, KeyedEdit, PasteEdit, ReshapeEdit, ScaleEdit
+from toolkit.detail_edit.mirror import Mirror
 from toolkit.detail_edit.region import Dab, Region, banded, grown, painted, shrunk, within
 from toolkit.detail_edit.solve import solve_detail_edit
 from toolkit.detail_edit.surface import Curve, Surface, SurfacePoint
@@ -37,6 +39,7 @@ __all__ = [
     "DetailTake",
     "GainEdit",
     "KeyedEdit",
+    "Mirror",
     "PasteEdit",
     "Region",
     "ReshapeEdit",
@@ -46,6 +49,7 @@ __all__ = [
     "banded",
     "curve_from_data",
     "curve_to_data",
+    "drawn",
     "find_window",
     "from_data",
     "grown",
@@ -53,6 +57,7 @@ __all__ = [
     "regions_from_data",
     "regions_to_data",
     "shrunk",
+    "snapped",
     "solve_detail_edit",
     "to_data",
     "within",

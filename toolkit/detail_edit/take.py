@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from threading import Lock
+from threading import RLock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,10 +24,10 @@ Ids = NDArray[np.int64]
 class _Shared:
     """What all states of a take have in common and is worth keeping; guarded, since edits are solved on threads."""
 
-    _MOST = 8
+    _MOST = 16
 
     def __init__(self) -> None:
-        self._lock = Lock()
+        self._lock = RLock()  # making one thing may ask for another
         self._kept: dict[Any, Any] = {}
 
     def get(self, key: Any, make: Any) -> Any:

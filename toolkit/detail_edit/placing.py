@@ -1,0 +1,170 @@
+"""Where the details of a paste or of a reshaped wrinkle come from and go to (the paper's section 5.2, Eq. 17)."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from toolkit.detail_edit.carry import Carrier, carrier
+from toolkit.detail_edit.edits import PasteEdit, ReshapeEdit
+from toolkit.detail_edit.flatten import FlatPatch, flattened, located, minimal_turn
+from toolkit.detail_edit.mirror import Mirror
+from toolkit.detail_edit.region import Region
+from toolkit.detail_edit.surface import Surface, SurfacePoint
+from toolkit.detail_edit.take import DetailTake
+from toolkit.errors import InputError
+from toolkit.mesh.topology import unique_edges
+from toolkit.solve import factorise
+
+__all__ = ["paste_carrier", "reshape_carrier"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Ids = NDArray[np.int64]
+
+_MARGIN = 4.0
+"""How far patches reach beyond what is needed, in edge lengths: every vertex in use must have its neighbours."""
+
+
+def paste_carrier(edit: PasteEdit, region: Region, take: DetailTake, source: DetailTake) -> Carrier:
+    """The map of a paste; ``region`` is the edit's with its band, on the ``source`` take."""
+    start = _axes_at(source, edit.start)
+    goal, axes = _goal(edit, take, source, start)
+    margin = _MARGIN * source.surface.edge(region.vertices)
+    here = _patch(source, _near(source.surface, region, margin), edit.start, start)
+    if here is None or not np.isin(region.vertices, here.vertices).any():
+        raise InputError(
+            "the point that the paste starts from does not lie in the region, or not on the same part of the face",
+            remedy="choose a start inside the region",
+        )
+    lost = ~np.isin(region.vertices, here.vertices)
+    inside = Region(region.vertices[~lost], region.weights[~lost])
+    held = np.searchsorted(here.vertices, inside.vertices)
+    size = edit.scale * _unit(take) / _unit(source) if source is not take else edit.scale
+    turn = size * np.exp(1j * np.radians(edit.rotation))
+    bent = turn * (here.places.conj() if edit.mirror else here.places)
+    reach = float(np.abs(bent[held]).max())
+    reach = 1.15 * reach + _MARGIN * take.surface.edge()
+    around = np.flatnonzero(np.isfinite(take.surface.distance([goal], reach)))
+    there = _patch(take, around, goal, axes)
+    if there is None:
+        raise InputError("there is no skin round the point that the paste goes to", remedy="choose another goal")
+    return carrier(here, bent, inside, there, (source.neighbour, take.neighbour), size * edit.strength, edit.mirror)
+
+
+def reshape_carrier(edit: ReshapeEdit, region: Region, take: DetailTake) -> Carrier:
+    """The map of a reshaped wrinkle; ``region`` is the edit's with its band.
+
+    ``argmin_u sum_c |C u - goal_c|^2 + stiffness |L (u - u_0)|^2`` in the plane: points c of the curve, goals by the
+    same share of the arc length, L the mean-of-neighbours Laplacian.
+    """
+    surface = take.surface
+    surface.check_triangles(np.concatenate([edit.curve.triangles, edit.goal.triangles]))
+    flat = _reshape_patch(edit, region, take)
+    start, end = (flat.at(line.triangles, line.weights, surface) for line in (edit.curve, edit.goal))
+    if np.isnan(start).any() or np.isnan(end).any():
+        raise InputError(
+            "the two curves do not lie on one part of the face that hangs together", remedy="draw them closer together"
+        )
+    if abs(start[0] - end[0]) + abs(start[-1] - end[-1]) > abs(start[0] - end[-1]) + abs(start[-1] - end[0]):
+        end = end[::-1]  # a wrinkle has no direction, and people draw from either side
+    edges = np.abs(flat.places[flat.triangles[:, 0]] - flat.places[flat.triangles[:, 1]])
+    count = max(int(np.ceil(2 * _length(start) / float(np.median(edges)))), 2)
+    bent = flat.places + _bend(flat, _along(start, count), _along(end, count), edit.stiffness)
+    return carrier(flat, bent, region, flat, (take.neighbour, take.neighbour), 1.0)
+
+
+def _goal(edit: PasteEdit, take: DetailTake, source: DetailTake, start: Array) -> tuple[SurfacePoint, Array]:
+    """Where the start goes, and the axes ``(3, 3)`` there that the source's are carried to."""
+    goal = edit.goal if edit.goal is not None else edit.start
+    if edit.mirror:
+        mirror: Mirror = take.shared.get("mirror", lambda: Mirror(take.surface))
+        if edit.goal is None:
+            goal = mirror.across(edit.start)
+        # The plane's axes are mirrored with the skin; the imaginary one turns round with the patch (`paste_carrier`).
+        start = start @ mirror.reflection.T
+    take.surface.check_triangles(np.array([goal.triangle]))
+    normal = _axes_at(take, goal)[2]
+    first = minimal_turn(start[2], normal) @ start[0]
+    first -= (first @ normal) * normal
+    first /= np.linalg.norm(first)
+    return goal, np.stack([first, np.cross(normal, first), normal])
+
+
+def _axes_at(take: DetailTake, point: SurfacePoint) -> Array:
+    """Tangent, bitangent and normal at a point, ``(3, 3)`` rows."""
+    take.surface.check_triangles(np.array([point.triangle]))
+    corners = take.surface.triangles[point.triangle]
+    frames = take.frames0[corners]
+    normal = np.array(point.weights) @ frames[:, :, 2]
+    normal /= np.linalg.norm(normal)
+    first = frames[int(np.argmax(point.weights)), :, 0]
+    first = first - (first @ normal) * normal
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first), normal])
+
+
+def _patch(take: DetailTake, vertices: Ids, centre: SurfacePoint, axes: Array) -> FlatPatch | None:
+    """A patch laid flat; kept, since the same is asked for while a paste is being turned or a goal curve drawn."""
+    key = ("patch", vertices.tobytes(), centre, axes.tobytes())
+    corners = take.surface.triangles[centre.triangle]
+    flat: FlatPatch | None = take.shared.get(
+        key, lambda: flattened(take.surface, vertices, corners, np.array(centre.weights), axes)
+    )
+    return flat
+
+
+def _near(surface: Surface, region: Region, margin: float) -> Ids:
+    distance = surface.distance_from_vertices(region.vertices, margin)
+    return np.flatnonzero(np.isfinite(distance))
+
+
+def _reshape_patch(edit: ReshapeEdit, region: Region, take: DetailTake) -> FlatPatch:
+    """All that lies no farther from the wrinkle than the goal and the region do, and a margin."""
+    surface = take.surface
+    margin = _MARGIN * surface.edge(region.vertices)
+    gap = surface.distance(edit.curve)
+    farthest = max(
+        float(gap[region.vertices].max()), float(gap[np.unique(surface.triangles[edit.goal.triangles])].max())
+    )
+    if not np.isfinite(farthest):
+        raise InputError("the region and the two curves do not lie on one part of the face that hangs together")
+    centre = edit.curve.point(len(edit.curve) // 2)
+    flat = _patch(take, np.flatnonzero(gap <= farthest + margin), centre, _axes_at(take, centre))
+    if flat is None:
+        raise InputError("there is no skin round the wrinkle's curve")
+    return flat
+
+
+def _bend(flat: FlatPatch, start: Complex, goal: Complex, stiffness: float) -> Complex:
+    """Displacement ``(n,)`` of a patch that takes points ``start`` (k,) to ``goal`` (k,)."""
+    triangle, weights = located(flat.places, flat.triangles, start)
+    seen = triangle >= 0
+    corners, weights = flat.triangles[triangle[seen]], weights[seen]
+    n = len(flat.vertices)
+    rows = np.repeat(np.arange(len(corners)), 3)
+    at_curve = sp.csr_matrix((weights.ravel(), (rows, corners.ravel())), shape=(len(corners), n))
+    i, j = unique_edges(flat.triangles).T
+    adjacency = sp.csr_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=(n, n))
+    mean = sp.diags(1 / np.maximum(np.asarray(adjacency.sum(axis=1)).ravel(), 1)) @ adjacency
+    laplacian = sp.identity(n) - mean
+    matrix = at_curve.T @ at_curve + stiffness * (laplacian.T @ laplacian)
+    right = at_curve.T @ (goal - start)[seen]
+    solved = factorise(sp.csc_matrix(matrix)).solve(np.stack([right.real, right.imag], axis=1))
+    return np.asarray(solved[:, 0] + 1j * solved[:, 1])
+
+
+def _along(line: Complex, count: int) -> Complex:
+    """Points ``(count,)`` evenly spread by arc length along a polyline."""
+    at = np.concatenate([[0], np.cumsum(np.abs(np.diff(line)))])
+    asked = np.linspace(0, at[-1], count)
+    return np.asarray(np.interp(asked, at, line.real) + 1j * np.interp(asked, at, line.imag))
+
+
+def _length(line: Complex) -> float:
+    return float(np.abs(np.diff(line)).sum())
+
+
+def _unit(take: DetailTake) -> float:
+    return float(np.sqrt(np.mean(np.var(take.smooth, axis=0))))

@@ -1,0 +1,126 @@
+"""The edit of one key frame carried through its window by least squares in space and time (the paper's Eqs. 18-21).
+
+For the change ``x = D' - D`` of the details, ``D`` the automatic result, E the change asked for at the key frame:
+
+    min_x  key |x_tk - E|^2 + gradient (sum_t |x_t+1 - x_t|^2 + sum_t x_t^T L x_t) + ends (|x_ts|^2 + |x_te|^2)
+
+``L`` is the graph Laplacian of the region's edges, those to its unedited surroundings included. The normal matrix is
+``M (x) I + gradient I (x) L`` with M (m, m) tridiagonal. ``M = Q diag(s) Q^T`` leaves m systems
+``(s_i I + gradient L) y_i = key Q[k, i] E``, all with one right-hand side: every one of them has its solution in the
+Krylov space of E, so that one Lanczos run solves them all, ``x_t = sum_i Q[t, i] y_i``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.linalg import eigh_tridiagonal, solveh_banded
+
+__all__ = ["GradientWeights", "propagated", "region_laplacian", "time_matrix"]
+
+Array = NDArray[np.float64]
+Ids = NDArray[np.int64]
+
+_TOLERANCE = 1e-11
+_CHECK_EVERY = 10
+_MOST_STEPS = 2000
+
+
+@dataclass(frozen=True)
+class GradientWeights:
+    """The paper's weights: ``key`` lambda_e, ``gradient`` lambda_t and ``ends`` lambda_s."""
+
+    key: float = 1.0
+    gradient: float = 0.1
+    ends: float = 1.0
+
+
+def time_matrix(window: tuple[int, int], frame: int, weights: GradientWeights) -> tuple[Array, Array]:
+    """Diagonal ``(m,)`` and off-diagonal ``(m - 1,)`` of M."""
+    m = window[1] - window[0] + 1
+    diagonal = np.zeros(m)
+    diagonal[:-1] += weights.gradient
+    diagonal[1:] += weights.gradient
+    diagonal[frame - window[0]] += weights.key
+    diagonal[0] += weights.ends
+    diagonal[-1] += weights.ends
+    return diagonal, np.full(m - 1, -weights.gradient)
+
+
+def region_laplacian(triangles: NDArray[np.integer], vertices: Ids) -> sp.csr_matrix:
+    """Graph Laplacian ``(n, n)`` of the vertices (n,) with all their edges, held to 0 where one leaves the region.
+
+    ``triangles`` (f, 3) must hold all triangles at the vertices.
+    """
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    edges = np.unique(edges, axis=0).astype(np.int64)
+    found = np.minimum(np.searchsorted(vertices, edges), len(vertices) - 1)
+    inside = vertices[found] == edges
+    n = len(vertices)
+    i, j = found[inside.all(axis=1)].T
+    joined = sp.coo_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), (n, n))
+    return sp.csr_matrix(sp.diags(np.bincount(found[inside], minlength=n).astype(float)) - joined)
+
+
+def propagated(
+    laplacian: sp.csr_matrix, asked: Array, window: tuple[int, int], frame: int, weights: GradientWeights
+) -> Array:
+    """Change ``(m, n, c)`` of every frame of the window from the one ``asked`` (n, c) for at the key frame."""
+    shifts, modes = eigh_tridiagonal(*time_matrix(window, frame, weights))
+    matrix = sp.csr_matrix(weights.gradient * laplacian)
+    right = weights.key * modes[frame - window[0]]
+    basis, diagonals, subdiagonals = _lanczos(matrix, asked, float(shifts[0]))
+    changes = np.empty((len(shifts), *asked.shape))
+    lengths = np.sqrt((asked**2).sum(axis=0))
+    for c in range(asked.shape[1]):
+        # (T + s I)^-1 e_1 for every shift, by the eigenvectors of T; then from modes to frames.
+        values, vectors = eigh_tridiagonal(diagonals[:, c], subdiagonals[:, c])
+        first = lengths[c] * vectors[0]
+        spread = (right[:, None] * first) / (shifts[:, None] + values)
+        changes[:, :, c] = (modes @ spread @ vectors.T) @ basis[:, c]
+    return changes
+
+
+def _lanczos(matrix: sp.csr_matrix, start: Array, smallest: float) -> tuple[Array, Array, Array]:
+    """Lanczos basis ``(j, c, n)`` from each column of ``start`` (n, c), with its tridiagonal matrices.
+
+    As many steps as the hardest system, the one of the ``smallest`` shift, takes to a residual of 1e-11. Lost
+    orthogonality does no harm to solutions of linear systems: it only takes some steps more, as in conjugate gradients.
+    """
+    n, columns = start.shape
+    current = start / np.maximum(np.sqrt((start**2).sum(axis=0)), 1e-300)
+    before, beta = np.zeros_like(current), np.zeros(columns)
+    basis: list[Array] = []
+    alphas: list[Array] = []
+    betas: list[Array] = []
+    while len(basis) < _MOST_STEPS:
+        basis.append(np.ascontiguousarray(current.T))
+        after = matrix @ current - beta * before
+        alpha = np.einsum("nc,nc->c", after, current)
+        after -= alpha * current
+        beta = np.sqrt(np.einsum("nc,nc->c", after, after))
+        alphas.append(alpha)
+        if len(basis) % _CHECK_EVERY == 0 or len(basis) >= n:
+            residual = _residual(np.array(alphas), np.array(betas).reshape(-1, columns), beta, smallest)
+            if residual < _TOLERANCE or len(basis) >= 2 * n + _CHECK_EVERY:
+                break
+        betas.append(beta)
+        before, current = current, after / np.maximum(beta, 1e-300)
+    return np.stack(basis), np.array(alphas), np.array(betas).reshape(-1, columns)
+
+
+def _residual(alphas: Array, betas: Array, last: Array, shift: float) -> float:
+    """Largest residual of ``(T + shift I) y = e_1`` over the columns, as the Lanczos relation gives it."""
+    worst = 0.0
+    for c in range(alphas.shape[1]):
+        # One row of padding: the solver does not take a single unknown.
+        banded = np.zeros((2, len(alphas) + 1))
+        banded[0, :-1], banded[0, -1] = alphas[:, c] + shift, 1
+        banded[1, : len(betas)] = betas[:, c]
+        unit = np.zeros(len(alphas) + 1)
+        unit[0] = 1
+        worst = max(worst, float(abs(last[c] * solveh_banded(banded, unit, lower=True)[-2])))
+    return worst
