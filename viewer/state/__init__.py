@@ -1,0 +1,1 @@
+"""What the viewer shows and what happens on each gesture: plain objects, tested without a display."""

@@ -1,0 +1,218 @@
+"""The window: two panes, the panel, the time line, the status line; what changed is drawn once a tick."""
+
+from __future__ import annotations
+
+import logging
+import time
+from typing import Any
+
+from viewer.legend import draw_legend
+from viewer.script import Player, Recorder
+from viewer.state.app import App
+from viewer.state.events import Event, Key
+from viewer.state.look import help_lines
+from viewer.view import open3d_calls as native
+from viewer.view.open3d_calls import gui, image_of
+from viewer.view.pane import Pane
+from viewer.view.panel import Panel
+from viewer.view.time_bar import TimeBar
+
+__all__ = ["Window"]
+
+log = logging.getLogger(__name__)
+
+_PANEL_EM = 24.0
+_TIMES_EM, _PICTURE_EM, _STATUS_EM = 2.1, 7.0, 1.9
+_TITLE = (0.80, 0.82, 0.86)
+_TONES = {"plain": (0.86, 0.88, 0.91), "good": (0.45, 0.85, 0.52), "bad": (1.0, 0.55, 0.42)}
+
+
+class Window:
+    """Shows an `App` until it asks to quit."""
+
+    def __init__(
+        self,
+        app: App,
+        size: tuple[int, int] = (1500, 920),
+        player: Player | None = None,
+        recorder: Recorder | None = None,
+    ) -> None:
+        self.app, self._player, self._recorder = app, player, recorder
+        self.application = gui.Application.instance
+        self.application.initialize()
+        title = f"Mien: {app.shot.path.resolve().name}"
+        self.window = self.application.create_window(title, *size)
+        self._em = self.window.theme.font_size
+        self.panes = [Pane(self.window, app, index, self.send) for index in (0, 1)]
+        self.panel = Panel(self.window, self.send, _PANEL_EM)
+        self.times = TimeBar(self.window, app, self.send)
+        self._titles = [gui.Label("") for _ in self.panes]
+        self._status = gui.Label("")
+        self._progress = gui.ProgressBar()
+        self._legend = gui.ImageWidget()
+        self._legend_of: Any = None
+        self._help = gui.Vert(0, gui.Margins(1.2 * self._em, 0.8 * self._em, 1.2 * self._em, 0.8 * self._em))
+        self._help_proxy = gui.WidgetProxy()
+        self._build()
+        self._held: set[str] = set()
+        self._last = time.monotonic()
+        self._settle = 3
+        self._quitting = False
+
+    def run(self) -> None:
+        """Until the window is closed."""
+        self.application.run()
+
+    def send(self, event: Event) -> None:
+        """One event, of the user or of a script."""
+        if self._recorder is not None:
+            self._recorder.write(event)
+        self.app.handle(event)
+
+    # -- building -------------------------------------------------------------------------------------------------
+
+    def _build(self) -> None:
+        for pane in self.panes:
+            self.window.add_child(pane.widget)
+        self._help.add_child(self._help_proxy)
+        self._help.background_color = gui.Color(0.08, 0.085, 0.1, 0.96)
+        self._help.visible = self._legend.visible = self._progress.visible = False
+        for label in self._titles:
+            label.text_color = gui.Color(*_TITLE)
+            label.background_color = gui.Color(0.0, 0.0, 0.0, 0.0)
+        for widget in (
+            self.panel.widget, self.times.buttons, self.times.picture, *self._titles,
+            self._status, self._progress, self._legend, self._help,
+        ):  # fmt: skip
+            self.window.add_child(widget)
+        self.window.set_on_layout(self._layout)
+        self.window.set_on_tick_event(self._tick)
+        self.window.set_on_key(self._key)
+        self.window.set_on_close(self._closing)
+
+    def _layout(self, context: Any) -> None:
+        em, whole = self._em, self.window.content_rect
+        wide = int(_PANEL_EM * em)
+        left, top, width = whole.x, whole.y, max(whole.width - wide, 200)
+        status, picture, times = (int(part * em) for part in (_STATUS_EM, _PICTURE_EM, _TIMES_EM))
+        high = max(whole.height - status - picture - times, 100)
+        half = width // 2
+        self.panes[0].place(gui.Rect(left, top, half - 1, high))
+        self.panes[1].place(gui.Rect(left + half + 1, top, width - half - 1, high))
+        self.panel.widget.frame = gui.Rect(left + width, top, wide, whole.height - status)
+        y = top + high
+        self.times.place(gui.Rect(left, y, width, times), gui.Rect(left, y + times, width, picture))
+        bar = int(11 * em)
+        self._status.frame = gui.Rect(left + int(0.5 * em), y + times + picture, whole.width - bar - int(em), status)
+        self._progress.frame = gui.Rect(
+            whole.get_right() - bar, y + times + picture + int(0.4 * em), bar - int(0.5 * em), status - int(0.8 * em)
+        )
+        for pane, label in zip(self.panes, self._titles, strict=True):
+            frame = pane.widget.frame
+            label.frame = gui.Rect(
+                frame.x + int(0.6 * em), frame.y + int(0.3 * em), frame.width - int(em), int(1.6 * em)
+            )
+        self._place_legend()
+        need = self._help.calc_preferred_size(context, gui.Widget.Constraints())
+        self._help.frame = gui.Rect(left + int(2 * em), top + int(2 * em), need.width, need.height)
+        self._settle = 3
+        self.app.touch("camera", "faces", "overlay", "timeline")
+
+    def _place_legend(self) -> None:
+        em, frame = self._em, self.panes[1].widget.frame
+        width, height = int(17 * em), int(3.6 * em)
+        self._legend.frame = gui.Rect(
+            frame.get_right() - width - int(0.6 * em), frame.get_bottom() - height - int(0.6 * em), width, height
+        )
+
+    # -- drawing --------------------------------------------------------------------------------------------------
+
+    def _tick(self) -> bool:
+        now = time.monotonic()
+        passed, self._last = now - self._last, now
+        if self._player is not None:
+            self._player.play(self.send, self.app, self)
+        self.panel.tick()
+        self.app.tick(min(passed, 0.5))
+        if self.app.quit_asked and not self._quitting:
+            self._quitting = True
+            native.quit_later(self.application, self.window)
+        changes = self.app.take_changes()
+        if self._settle:  # Open3D sets its own projection once after a change of size
+            self._settle -= 1
+            changes.add("camera")
+        if changes:
+            self._draw(changes)
+        return bool(changes)
+
+    def _draw(self, changes: set[str]) -> None:
+        for pane in self.panes:
+            if "camera" in changes:
+                pane.draw_camera()
+            if "faces" in changes:
+                pane.draw_face()
+            if "overlay" in changes:
+                pane.draw_overlay()
+        if "faces" in changes:
+            self._draw_titles()
+        if "timeline" in changes:
+            self.times.draw()
+        if "panel" in changes:
+            self._draw_panel()
+        if changes & {"status", "panel", "timeline"}:
+            self._draw_status()
+
+    def _draw_titles(self) -> None:
+        for label, words in zip(self._titles, self.app.pair.titles, strict=True):
+            label.text = words
+        field = self.app.field(1)
+        self._legend.visible = field is not None
+        if field is not None and self._legend_of != field.scale:
+            self._legend_of = field.scale
+            self._legend.update_image(image_of(draw_legend(field.scale, int(17 * self._em), self._em / 16)))
+            self._place_legend()
+
+    def _draw_panel(self) -> None:
+        anew = self.panel.show(self.app.rows())
+        if self._help.visible != self.app.help_shown:
+            self._help.visible = self.app.help_shown
+            if self.app.help_shown:
+                self._help_proxy.set_widget(self._help_widget())
+            anew = True
+        if anew:
+            self.window.set_needs_layout()
+
+    def _draw_status(self) -> None:
+        words, tone = self.app.status_line()
+        self._status.text, self._status.text_color = words, gui.Color(*_TONES[tone])
+        progress = self.app.worker.progress
+        self._progress.visible = progress is not None
+        if progress is not None:
+            self._progress.value = progress[1] / progress[2] if progress[2] else 0.0
+
+    def _help_widget(self) -> Any:
+        grid = gui.VertGrid(2, 0.25 * self._em)
+        for key, words in help_lines(self.app):
+            label = gui.Label(key)
+            label.text_color = gui.Color(1.0, 0.80, 0.40)
+            grid.add_child(label)
+            grid.add_child(gui.Label(words))
+        return grid
+
+    # -- keys and the end -----------------------------------------------------------------------------------------
+
+    def _key(self, event: Any) -> bool:
+        held = native.held_name(event)
+        down = event.type == gui.KeyEvent.Type.DOWN
+        if held is not None:
+            (self._held.add if down else self._held.discard)(held)
+            return False
+        name = native.key_name(event)
+        if not down or name is None:
+            return False
+        self.send(Key(name, tuple(sorted(self._held))))
+        return True
+
+    def _closing(self) -> bool:
+        self.app.mode.leave()
+        return True
