@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,16 +19,20 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _ITERATIONS = 3
-_RELAXATIONS = 6
+_RELAXATIONS = 2
+_OVERLAP = 0.1
+"""How far, in cm, a coarser region reaches into a finer one: else the seam keeps the old mesh's short edges."""
 
 
 @dataclass(frozen=True)
 class Density:
-    """Triangles of edge ``length`` within ``reach`` of the ``near`` (n,) vertices; all of the mesh where reach is 0."""
+    """Triangles of edge ``length`` where a vertex of some area is within the area's reach.
+
+    ``areas`` are pairs (reach, vertex ids); without any, all of the mesh.
+    """
 
     length: float
-    reach: float
-    near: tuple[int, ...] = ()
+    areas: tuple[tuple[float, tuple[int, ...]], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -69,21 +74,24 @@ def remesh(
     densities: list[Density],
     lines: dict[str, list[int]],
 ) -> Remesh:
-    """Re-mesh a head: coarse everywhere first, then finer by region, with edges along ``lines`` and the holes' rims.
+    """Re-mesh a head, finer by region, with edges along ``lines`` and the holes' rims.
 
     Only the outer skin is re-meshed, cut open along the rims, so that lids and lips stay sharp; what is behind the
-    rims keeps its faces and is sewn on. Give it a pose in which the lips are apart: closest points must not find the
-    other sheet. ``vertices`` (V, 3), ``quads`` (F, 4) of the whole head, ``lines`` open edge paths.
+    rims keeps its faces and is sewn on. Every region is re-meshed once and from the old surface itself, for a coarse
+    mesh that is refined later cannot find its way back into a fold: ``densities`` go from the finest, each with all
+    that the finer ones leave. Give it a pose in which the lips are apart, closest points must not find the other
+    sheet, and in which no skin is folded away. ``vertices`` (V, 3), ``quads`` (F, 4) of the whole head, ``lines``
+    open edge paths.
     """
     inside = np.concatenate([hole.quads for hole in holes])
     skin = split_quads(quads[~_is_among(quads, inside)])
     new: Array = vertices
     faces: NDArray[np.integer] = skin
-    for density in densities:
-        picked: NDArray[np.bool_] | None = None
-        if density.reach > 0:
-            centres = new[faces].mean(axis=1)
-            picked = _distance(centres, vertices[list(density.near)]) < density.reach
+    for k, density in enumerate(densities):
+        centres = new[faces].mean(axis=1)
+        picked = ~_within(centres, vertices, [area for finer in densities[:k] for area in finer.areas], _OVERLAP)
+        if density.areas:
+            picked &= _within(centres, vertices, density.areas)
         new, faces = _isotropic(new, faces, density.length, picked)
     loops = border_loops(faces)
     rims = {}
@@ -96,6 +104,16 @@ def remesh(
         faces, places = _sew(faces, places, rims[hole.name], hole, vertices)
         paths[f"{hole.name}_upper"], paths[f"{hole.name}_lower"] = rims[hole.name]
     return Remesh(faces.astype(np.int32), places, paths)
+
+
+def _within(
+    points: Array, vertices: Array, areas: Sequence[tuple[float, tuple[int, ...]]], less: float = 0.0
+) -> NDArray[np.bool_]:
+    """Mask ``(n,)`` of the points in some area; the areas' reach is made smaller by ``less``."""
+    inside = np.zeros(len(points), dtype=bool)
+    for reach, near in areas:
+        inside |= _distance(points, vertices[list(near)]) < reach - less
+    return inside
 
 
 def _is_among(quads: Index, some: Index) -> NDArray[np.bool_]:
@@ -186,19 +204,17 @@ def _share_of_length(curve: Array) -> Array:
 
 
 def _isotropic(
-    vertices: Array, triangles: NDArray[np.integer], length: float, picked: NDArray[np.bool_] | None
+    vertices: Array, triangles: NDArray[np.integer], length: float, picked: NDArray[np.bool_]
 ) -> tuple[Array, NDArray[np.integer]]:
     import pymeshlab
 
-    quality = np.ones(len(triangles)) if picked is None else picked.astype(np.float64)
     meshes = pymeshlab.MeshSet()
-    meshes.add_mesh(pymeshlab.Mesh(vertices, triangles, f_scalar_array=quality))
-    if picked is not None:
-        meshes.compute_selection_by_condition_per_face(condselect="fq > 0.5")
+    meshes.add_mesh(pymeshlab.Mesh(vertices, triangles, f_scalar_array=picked.astype(np.float64)))
+    meshes.compute_selection_by_condition_per_face(condselect="fq > 0.5")
     meshes.meshing_isotropic_explicit_remeshing(
         iterations=_ITERATIONS,
         targetlen=pymeshlab.PureValue(length),
-        selectedonly=picked is not None,
+        selectedonly=True,
         checksurfdist=False,
         featuredeg=180,
     )

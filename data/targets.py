@@ -26,10 +26,11 @@ ARCS = ("eyelid_left", "eyelid_right", "lip_inner", "lip_outer")
 """Openings whose rim is given as ``<name>_upper`` and ``<name>_lower``, corner to corner, and whole as ``<name>``."""
 RIMS = {"eyelid_left": "eyelid_rim_left", "eyelid_right": "eyelid_rim_right", "lip_inner": "lip_inner"}
 
-_EDGES = {0: (1.0, 0.55, 0.30), 1: (0.60, 0.33, 0.18), 2: (0.34, 0.19, 0.11)}
-"""Edge lengths in cm of the skull, the face, and the rims of lips, lids and nostrils, by level."""
-_PARTED = 0.35
-"""How far the jaw is open while the head is re-meshed, so that closest points never find the other lip."""
+_EDGES = {0: (1.0, 0.55, 0.30, 0.20), 1: (0.60, 0.33, 0.18, 0.11), 2: (0.34, 0.19, 0.11, 0.06)}
+"""Edge lengths in cm of the skull, the face, the rims of lips and nostrils, and the lids, by level."""
+_RESHAPED = {"jawOpen": 0.35, "eyeBlinkLeft": 0.5, "eyeBlinkRight": 0.5}
+"""The pose in which a head is re-meshed. The lips are apart, so that closest points never find the other one, and the
+lids half shut: at rest most of the upper lid's skin is folded away, and would get no vertices to unfold with."""
 
 
 @dataclass(frozen=True)
@@ -116,23 +117,25 @@ def _round(upper: list[int], lower: list[int]) -> list[int]:
 
 
 def _another_topology(layout: Layout, head: Head, level: int) -> Remesh:
-    jaw = np.zeros(len(SHAPES))
-    jaw[SHAPES.index("jawOpen")] = _PARTED
-    parted = layout.subdivision.matrix @ head.shape(jaw)
-    skull, face, rim = _EDGES[level]
-    loops = ("lip_inner", "lip_outer", "eyelid_rim_left", "eyelid_rim_right", "nostril_rim_left", "nostril_rim_right")
-    features = tuple(v for loop in loops for v in layout.loop(loop, LEVELS))
-    ears = tuple(v for loop in ("ear_helix_left", "ear_helix_right") for v in layout.loop(loop, LEVELS))
+    weights = np.array([_RESHAPED.get(shape, 0.0) for shape in SHAPES])
+    reshaped = layout.subdivision.matrix @ head.shape(weights)
+    skull, face, rim, lid = _EDGES[level]
+    lids = _around(layout, "eyelid_rim_left", "eyelid_rim_right")
+    features = _around(layout, "lip_inner", "lip_outer", "nostril_rim_left", "nostril_rim_right") + lids
+    ears = _around(layout, "ear_helix_left", "ear_helix_right")
     densities = [
-        Density(skull, 0),
-        Density(face, 3.5, features),
-        Density(face, 1.5, ears),
-        Density(rim, 0.4, ears),
-        Density(rim, 0.8, features),
+        Density(lid, ((0.5, lids),)),
+        Density(rim, ((0.8, features), (1.3, lids), (0.4, ears))),
+        Density(face, ((3.5, features), (1.5, ears))),
+        Density(skull),
     ]
     lines = {name: layout.arc(name, LEVELS) for name in ("lip_outer_upper", "lip_outer_lower")}
     holes = [_hole(layout, name, loop, min(level, 1)) for name, loop in RIMS.items()]
-    return remesh(parted, layout.quads(LEVELS), holes, densities, lines)
+    return remesh(reshaped, layout.quads(LEVELS), holes, densities, lines)
+
+
+def _around(layout: Layout, *loops: str) -> tuple[int, ...]:
+    return tuple(v for loop in loops for v in layout.loop(loop, LEVELS))
 
 
 def _hole(layout: Layout, name: str, loop: str, inner_level: int) -> Hole:
