@@ -1,0 +1,116 @@
+"""Shots for the benchmarks of speed, run in processes of their own, with their time and memory."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks._scale.takes import PerformerAt
+from toolkit.feature_lines import save_feature_lines
+from toolkit.meshio import write_mesh
+
+__all__ = ["ROOT", "Run", "read_write_floor", "run_measured", "substitution_floor", "warm_up", "write_shot"]
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True)
+class Run:
+    """Stages 2 to 5, run anew in a fresh process.
+
+    ``own_gb`` is the most memory of its own that the process had (what it allocated), ``peak_gb`` with the pages of
+    mapped files that the system gives back when it needs them (GiB); ``own_gb`` is NaN where the system does not tell.
+    """
+
+    total_s: float
+    cpu_s: float
+    stages: dict[str, float]
+    bases: int
+    own_gb: float
+    peak_gb: float
+
+    def data(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+def write_shot(folder: Path, performer: PerformerAt, n_frames: int, n_bases: int, options: str = "") -> None:
+    """A shot of the performer and a stretched copy as target, so that no registration is in the way."""
+    mesh = performer.mesh
+    write_mesh(folder / "source.ply", mesh)
+    write_mesh(folder / "target.ply", mesh.with_vertices(mesh.vertices * [1.12, 0.95, 1.05]))
+    save_feature_lines(folder / "feature_lines.json", performer.lines())
+    performer.write_take(folder / "take.npy", n_frames)
+    (folder / "shot.toml").write_text(
+        '[source]\nreference = "source.ply"\nframes = "take.npy"\nfps = 30\n[target]\nreference = "target.ply"\n'
+        f"[bases]\nthreshold = 1e-6\ncount = {n_bases}\n{options}",
+        encoding="utf-8",
+    )
+
+
+def run_measured(shot: Path) -> Run:
+    """Run the stages from decomposition to written frames in a fresh process."""
+    said, own, peak = _child("stages", shot)
+    return Run(said["total_s"], said["cpu_s"], said["stages"], said["bases"], own, peak)
+
+
+def substitution_floor(shot: Path) -> float:
+    """Seconds of the back-substitutions alone, in a fresh process, for a shot that was run."""
+    return float(_child("substitutions", shot)[0]["seconds"])
+
+
+def read_write_floor(take: Path, copy: Path) -> float:
+    """Seconds to read the take once and to write as many bytes; the copy is removed."""
+    began = time.perf_counter()
+    source = np.load(take, mmap_mode="r")
+    target = np.lib.format.open_memmap(copy, mode="w+", dtype=source.dtype, shape=source.shape)
+    size = max(1, 2**26 // source[:1].nbytes)
+    for start in range(0, len(source), size):
+        target[start : start + size] = source[start : start + size]
+    target.flush()
+    seconds = time.perf_counter() - began
+    copy.unlink()
+    return seconds
+
+
+def warm_up(folder: Path, performer: PerformerAt) -> None:
+    """Run a small shot once, so that everything is compiled."""
+    folder.mkdir()
+    write_shot(folder, performer, 40, 3)
+    run_measured(folder)
+
+
+def _child(task: str, shot: Path) -> tuple[dict[str, Any], float, float]:
+    """What ``benchmarks._scale.child`` says, and the most memory that it had: its own, and all (GiB)."""
+    command = [sys.executable, "-m", "benchmarks._scale.child", task, str(shot)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT)
+    peaks = [0.0]
+    watch = threading.Thread(target=_watch_memory, args=(process, peaks))
+    watch.start()
+    out = process.communicate()[0]
+    watch.join()
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
+    said = json.loads(out.splitlines()[-1])
+    return said, peaks[0] if peaks[0] else float("nan"), said["peak_gb"]
+
+
+def _watch_memory(process: subprocess.Popen[str], peaks: list[float]) -> None:
+    """Look from outside, fifty times a second, how much memory is the process's own (Linux)."""
+    status = Path(f"/proc/{process.pid}/status")
+    while process.poll() is None:
+        try:
+            lines = status.read_text(encoding="ascii").splitlines()
+        except OSError:
+            return
+        sizes = {line.split(":")[0]: line.split()[1] for line in lines if line.startswith(("RssAnon", "RssShmem"))}
+        peaks[0] = max(peaks[0], sum(int(size) for size in sizes.values()) / 2**20)
+        time.sleep(0.02)
