@@ -7,15 +7,17 @@ still hides those on its other side.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from toolkit.rendering import Camera
 from viewer.state.cameras import pixel_size
 from viewer.state.marks import Curve, Disc, Mark
 
-__all__ = ["CORNERS", "Triangles", "build", "triangles_for"]
+__all__ = ["CORNERS", "Triangles", "build", "triangles_for", "wire_triangles", "wires"]
 
 Array = NDArray[np.float64]
 Triangles = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -49,6 +51,42 @@ def build(marks: Sequence[Mark], camera: Camera, height: int) -> Triangles:
 def triangles_for(capacity: int) -> NDArray[np.int32]:
     """Triangles ``(capacity, 3)`` of separate corners."""
     return np.arange(3 * capacity, dtype=np.int32).reshape(-1, 3)
+
+
+def wire_triangles(n_edges: int) -> NDArray[np.int32]:
+    """Triangles ``(2 E, 3)`` of the bands that `wires` lays along E edges."""
+    first = 4 * np.arange(n_edges, dtype=np.int32)[:, None]
+    return (first + np.array([[0, 1, 2, 0, 2, 3]], dtype=np.int32)).reshape(-1, 3)
+
+
+def wires(
+    vertices: NDArray[np.float32], edges: NDArray[np.int32], camera: Camera, height: int, out: NDArray[np.float32]
+) -> None:
+    """Fill ``out`` (4 E, 3) with bands one pixel wide along ``edges`` (E, 2), a hair nearer to the camera."""
+    eye = np.asarray(camera.position, dtype=np.float32)
+    share = np.float32(np.tan(np.radians(camera.fov) / 2) / height)
+    _wires(vertices, edges, eye, share, np.float32(_LIFT / 4), out)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _wires(vertices: Any, edges: Any, eye: Any, share: Any, lift: Any, out: Any) -> None:
+    ends = np.empty((2, 3), np.float32)
+    for e in range(len(edges)):
+        for k in range(2):
+            for c in range(3):
+                place = vertices[edges[e, k], c]
+                ends[k, c] = place + lift * (eye[c] - place)
+        ux, uy, uz = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1], ends[1, 2] - ends[0, 2]
+        wx, wy, wz = eye[0] - ends[0, 0], eye[1] - ends[0, 1], eye[2] - ends[0, 2]
+        reach = np.sqrt(wx * wx + wy * wy + wz * wz)
+        x, y, z = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        length = np.sqrt(x * x + y * y + z * z)
+        scale = share * reach / length if length > 0 else np.float32(0.0)
+        x, y, z = x * scale, y * scale, z * scale
+        for k in range(2):
+            a, b = 4 * e + 3 * k, 4 * e + 1 + k
+            out[a, 0], out[a, 1], out[a, 2] = ends[k, 0] - x, ends[k, 1] - y, ends[k, 2] - z
+            out[b, 0], out[b, 1], out[b, 2] = ends[k, 0] + x, ends[k, 1] + y, ends[k, 2] + z
 
 
 def _fans(discs: Sequence[Disc], extra: float, lift: float, camera: Camera, height: int) -> Array:

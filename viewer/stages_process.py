@@ -1,7 +1,8 @@
-"""Run stages in a process of their own: solvers that hold the interpreter's lock would freeze the window.
+"""Run stages and exports in a process of their own: solvers that hold the interpreter's lock would freeze the window.
 
-``python -m viewer.stages_process DIR [STAGE ...]`` writes a JSON line for each report of progress; `run_in_process` is
-the caller's side. Stopping the process at any moment is safe, as every stage is written aside and renamed into place.
+``python -m viewer.stages_process DIR stages|export [NAME ...]`` writes a JSON line for each report of progress;
+`run_in_process` and `export_in_process` are the caller's side. Stopping the process at any moment is safe, as every
+stage is written aside and renamed into place.
 """
 
 from __future__ import annotations
@@ -19,8 +20,10 @@ from typing import IO, Any
 
 from toolkit.errors import InputError
 from toolkit.progress import Progress
+from toolkit.shot import Shot
+from toolkit.stages import run_stages
 
-__all__ = ["run_in_process"]
+__all__ = ["export_in_process", "run_in_process"]
 
 
 def run_in_process(folder: Path, stages: Sequence[str], progress: Progress) -> list[dict[str, Any]]:
@@ -28,7 +31,16 @@ def run_in_process(folder: Path, stages: Sequence[str], progress: Progress) -> l
 
     Cancelling (``progress`` raises) ends the process. Raises InputError with the stage's own sentence.
     """
-    command = [sys.executable, "-m", "viewer.stages_process", str(folder), *stages]
+    return _call(folder, "stages", stages, progress)
+
+
+def export_in_process(folder: Path, formats: Sequence[str], progress: Progress) -> list[dict[str, Any]]:
+    """Bring the result up to date, edits included, and export it; a report (`ExportReport`) for each format."""
+    return _call(folder, "export", formats, progress)
+
+
+def _call(folder: Path, what: str, names: Sequence[str], progress: Progress) -> list[dict[str, Any]]:
+    command = [sys.executable, "-m", "viewer.stages_process", str(folder.resolve()), what, *names]
     root = Path(__file__).resolve().parent.parent
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=root, bufsize=1
@@ -89,9 +101,6 @@ def _read(line: str) -> dict[str, Any]:
 
 def main(arguments: Sequence[str]) -> int:
     """The process's side."""
-    from toolkit.shot import Shot
-    from toolkit.stages import run_stages
-
     said = 0.0
 
     def progress(what: str, done: int, total: int) -> None:
@@ -102,12 +111,28 @@ def main(arguments: Sequence[str]) -> int:
             _say({"progress": [what, int(done), int(total)]})
 
     try:
-        reports = run_stages(Shot(arguments[0]), list(arguments[1:]) or None, progress=progress)
+        shot, what, names = Shot(arguments[0]), arguments[1], list(arguments[2:])
+        reports: list[Any] = run_stages(shot, (names or None) if what == "stages" else None, progress=progress)
+        if what == "export":
+            reports = _export(shot, names, progress)
     except InputError as error:
         _say({"error": str(error)})
         return 2
     _say({"reports": [vars(report) for report in reports]})
     return 0
+
+
+def _export(shot: Shot, formats: Sequence[str], progress: Progress) -> list[Any]:
+    from toolkit.export import FORMATS, export
+    from toolkit.stages.performance import load_performance
+
+    performance = load_performance(shot)
+    reports = []
+    for name in formats:
+        suffixes = FORMATS[name].suffixes
+        file_name = performance.name + suffixes[0] if suffixes else f"{performance.name}_{name}"
+        reports.append(export(performance, shot.export_folder / file_name, name, progress))
+    return reports
 
 
 def _say(words: dict[str, Any]) -> None:

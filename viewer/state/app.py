@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.errors import InputError
+from toolkit.mesh.topology import unique_edges
 from toolkit.rendering import Camera
 from toolkit.shot import Shot
 from viewer.modes.base import Mode, Tint
@@ -129,6 +130,17 @@ class App:
         if known is None or known[0] != key:
             known = self._surfaces[name] = (key, self._make_surface(name))
         return known[1]
+
+    def edges(self, pane: int) -> NDArray[np.int32]:
+        """The edges of a pane's mesh ``(E, 2)``, without the diagonals of its quads."""
+        mesh = self.data.source if self.surface(pane).mesh == "source" else self.data.target
+        if mesh.polygons is None:
+            return unique_edges(mesh.triangles).astype(np.int32)
+        ends = np.cumsum(mesh.polygons.counts)
+        following = np.arange(1, ends[-1] + 1)
+        following[ends - 1] = ends - mesh.polygons.counts
+        pairs = np.stack([mesh.polygons.indices, mesh.polygons.indices[following]], axis=1)
+        return np.unique(np.sort(pairs, axis=1), axis=0).astype(np.int32)
 
     def framing_camera(self, pane: int) -> Camera:
         """The camera of a pane."""
@@ -342,6 +354,12 @@ class App:
             self.choose_pair("references")
         self.faces_changed()
         self.touch()
+        self.check_steps()
+
+    def result_written(self) -> None:
+        """result/frames.npy is another: read it again."""
+        self.data = ShotData(self.shot)
+        self.faces_changed()
         self.check_steps()
 
     # -- inside ---------------------------------------------------------------------------------------------------

@@ -48,7 +48,7 @@ def _next_rows(app: App) -> list[Row]:
         return []
     words = advice(app)
     rows: list[Row] = [Heading("Next"), Note(words, "plain")]
-    if not (steps.done("register") or not steps.done("inputs")) or not app.data.has_registration:
+    if not steps.done("register") and app.mode.name != "landmarks":
         rows.append(Button("run:register", "Register"))
     rows.append(Button("run:all", "Run all steps that are to do"))
     return rows

@@ -210,4 +210,3 @@ def _snapshot(session: EditSession, before: Snapshot | None, live: bool = False)
         base,
         problems,
     )
-

@@ -26,7 +26,6 @@ class DynamicMesh:
     scene : the rendering Scene
     name : its name there
     triangles : (F, 3) of ``n_vertices``
-    on_top : drawn after the others, for overlays
     """
 
     def __init__(
@@ -35,14 +34,15 @@ class DynamicMesh:
         name: str,
         triangles: NDArray[np.int32],
         n_vertices: int,
-        lines: NDArray[np.int32] | None = None,
     ) -> None:
         self._scene, self.name = scene, name
-        self.positions = [np.zeros((n_vertices, 3), np.float32) for _ in range(_RING)]
+        # A bounding box without a volume is refused, with the end of the process.
+        corners = np.array([[-1, -1, -1], [1, 1, 1]], np.float32)
+        self.positions = [np.resize(corners, (n_vertices, 3)).astype(np.float32) for _ in range(_RING)]
         self.colors = [np.zeros((n_vertices, 3), np.float32) for _ in range(_RING)]
         self._clouds = [_cloud(p, c) for p, c in zip(self.positions, self.colors, strict=True)]
         self._turn = 0
-        self._mesh = _geometry(self.positions[0], self.colors[0], triangles, lines)
+        self._mesh = _geometry(self.positions[0], self.colors[0], triangles)
         material = rendering.MaterialRecord()
         material.shader = "defaultUnlit"
         scene.add_geometry(name, self._mesh, material)
@@ -179,12 +179,8 @@ def _geometry(
     positions: NDArray[np.float32],
     colors: NDArray[np.float32],
     triangles: NDArray[np.int32],
-    lines: NDArray[np.int32] | None,
 ) -> Any:
-    if lines is not None:
-        segments = o3d.t.geometry.LineSet(o3d.core.Tensor.from_numpy(positions), o3d.core.Tensor(lines))
-        segments.point.colors = o3d.core.Tensor.from_numpy(colors)
-        return segments
+    # A line set cannot be updated so (an unknown exception ends the process), hence ribbons for curves and wires.
     mesh = o3d.t.geometry.TriangleMesh()  # without triangle attributes: they crash the update
     mesh.vertex.positions = o3d.core.Tensor.from_numpy(positions)
     mesh.vertex.colors = o3d.core.Tensor.from_numpy(colors)

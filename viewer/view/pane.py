@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.mesh.topology import unique_edges
 from viewer import overlay, shading
 from viewer.state.app import App
 from viewer.state.cameras import pixel_ray
@@ -19,7 +18,6 @@ from viewer.view.open3d_calls import DynamicMesh, gui
 __all__ = ["Pane"]
 
 _WIRE = np.array([0.06, 0.06, 0.07], np.float32)
-_FAR_AWAY = 1e9
 _LABELS = 96
 
 
@@ -39,6 +37,7 @@ class Pane:
         self._triangles: Any = None
         self._normals = np.zeros((0, 3), np.float32)
         self._wires: DynamicMesh | None = None
+        self._edges = np.zeros((0, 2), np.int32)
         self._overlay: DynamicMesh | None = None
         self._capacity = 0
         self._labels: list[Any] = []
@@ -110,13 +109,14 @@ class Pane:
                 self._wires = None
             return
         if self._wires is None:
-            edges = unique_edges(self._triangles).astype(np.int32)
-            self._wires = DynamicMesh(self._scene, "wires", self._triangles, len(positions), edges)
+            self._edges = self.app.edges(self.index)
+            self._wires = DynamicMesh(
+                self._scene, "wires", overlay.wire_triangles(len(self._edges)), 4 * len(self._edges)
+            )
         to_positions, to_colors = self._wires.next_buffers()
-        eye = np.asarray(self.app.framing_camera(self.index).position, np.float32)
-        np.multiply(positions, np.float32(0.9985), out=to_positions)
-        to_positions += np.float32(0.0015) * eye  # a little towards the camera
         to_colors[:] = _WIRE
+        camera, height = self.app.framing_camera(self.index), self.app.pane_sizes[self.index][1]
+        overlay.wires(positions, self._edges, camera, height, to_positions)
         self._wires.show()
 
     def _draw_labels(self, marks: Any) -> None:
@@ -133,7 +133,7 @@ class Pane:
         for label, mark in zip(self._labels, wanted, strict=False):
             label.position = np.asarray(mark.position, np.float32)
             label.text = " " + mark.text
-            label.color = gui.Color(*mark.color)
+            label.color = gui.Color(1.0, 1.0, 1.0)
         for label in self._labels[len(wanted) :]:
             label.text = ""
 

@@ -221,7 +221,7 @@ class Panel:
     def _line(self, column: Any, text: str, widget: Any) -> None:
         """Labelled rows that follow each other share a grid, so that their widgets stand in one column."""
         if self._grid is None:
-            self._grid = gui.VertGrid(2, 0.25 * self._em)
+            self._grid = gui.VGrid(2, 0.25 * self._em)
             column.add_child(self._grid)
         self._grid.add_child(gui.Label(text))
         self._grid.add_child(widget)

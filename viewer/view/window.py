@@ -47,7 +47,11 @@ class Window:
         self.panel = Panel(self.window, self.send, _PANEL_EM)
         self.times = TimeBar(self.window, app, self.send)
         self._titles = [gui.Label("") for _ in self.panes]
+        # What no widget covers is never wiped.
+        self._floor = gui.Vert()
+        self._floor.background_color = gui.Color(0.175, 0.175, 0.18)
         self._status = gui.Label("")
+        self._status.background_color = gui.Color(0.175, 0.175, 0.18)
         self._progress = gui.ProgressBar()
         self._legend = gui.ImageWidget()
         self._legend_of: Any = None
@@ -67,7 +71,11 @@ class Window:
         """One event, of the user or of a script."""
         if self._recorder is not None:
             self._recorder.write(event)
-        self.app.handle(event)
+        try:
+            self.app.handle(event)
+        except Exception as error:
+            log.exception("%s", event)
+            self.app.say(f"that went wrong: {type(error).__name__}: {error}", "bad")
 
     # -- building -------------------------------------------------------------------------------------------------
 
@@ -82,7 +90,7 @@ class Window:
             label.background_color = gui.Color(0.0, 0.0, 0.0, 0.0)
         for widget in (
             self.panel.widget, self.times.buttons, self.times.picture, *self._titles,
-            self._status, self._progress, self._legend, self._help,
+            self._floor, self._status, self._progress, self._legend, self._help,
         ):  # fmt: skip
             self.window.add_child(widget)
         self.window.set_on_layout(self._layout)
@@ -103,6 +111,7 @@ class Window:
         y = top + high
         self.times.place(gui.Rect(left, y, width, times), gui.Rect(left, y + times, width, picture))
         bar = int(11 * em)
+        self._floor.frame = gui.Rect(left, y + times + picture, whole.width, status)
         self._status.frame = gui.Rect(left + int(0.5 * em), y + times + picture, whole.width - bar - int(em), status)
         self._progress.frame = gui.Rect(
             whole.get_right() - bar, y + times + picture + int(0.4 * em), bar - int(0.5 * em), status - int(0.8 * em)
@@ -191,7 +200,7 @@ class Window:
             self._progress.value = progress[1] / progress[2] if progress[2] else 0.0
 
     def _help_widget(self) -> Any:
-        grid = gui.VertGrid(2, 0.25 * self._em)
+        grid = gui.VGrid(2, 0.25 * self._em)
         for key, words in help_lines(self.app):
             label = gui.Label(key)
             label.text_color = gui.Color(1.0, 0.80, 0.40)
