@@ -3,8 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from toolkit.errors import InputError
+from toolkit.kernels import chebyshev_of_average
 from toolkit.mesh import TriangleMesh
 from toolkit.operators import smoothing_average
 from toolkit.smoothing import (
@@ -45,6 +47,24 @@ def test_blocks_in_single_precision(bump: TriangleMesh, take: np.ndarray) -> Non
     block = smoother.smooth_block(np.ascontiguousarray(deltas, dtype=np.float32))
     exact = smoother.smooth_block(np.ascontiguousarray(deltas))
     assert np.abs(block - exact).max() < 1e-6 * np.abs(deltas).max()
+
+
+@pytest.mark.parametrize("columns", [1, 48])
+def test_passes_taken_together_are_the_same_passes(bump: TriangleMesh, columns: int) -> None:
+    """To the bit: a row that is read too early or too late would show."""
+    average = smoothing_average(bump.triangles, bump.n_vertices)
+    order = reverse_cuthill_mckee(average)
+    rows = average[order][:, order].tocoo()
+    bandwidth = int(np.abs(rows.row - rows.col).max())
+    csr = rows.tocsr()
+    share = (1 / np.diff(csr.indptr)).astype(np.float32)
+    block = np.random.default_rng(2).normal(size=(bump.n_vertices, columns)).astype(np.float32)
+    coefficients = (0.8 ** np.arange(20)).astype(np.float32)
+    graph = csr.indptr.astype(np.uint32), csr.indices.astype(np.uint32), share, coefficients
+    one_by_one = chebyshev_of_average(*graph, bump.n_vertices, 1, block)
+    assert bump.n_vertices > 4 * bandwidth
+    for depth in (2, 7, 19, 40):
+        assert np.array_equal(chebyshev_of_average(*graph, bandwidth, depth, block), one_by_one)
 
 
 @pytest.mark.parametrize("wavelength", [0.6, 1.2, 2.4])

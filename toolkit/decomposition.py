@@ -72,7 +72,7 @@ class Decomposer:
         frames = local_frames(smooth, mesh.triangles, neighbour)
         detail = np.einsum("vji,vj->vi", frames, mesh.vertices - smooth)
         self.rest = RestShape(smooth, detail, np.asarray(neighbour, dtype=np.int64))
-        self.block = BlockNumbering(self.filter.order, mesh.triangles, neighbour)
+        self.block = BlockNumbering(self.filter, mesh.triangles, neighbour)
         order = self.filter.order
         self._origin = smooth.mean(axis=0)
         self._rest = np.ascontiguousarray(mesh.vertices[order])
@@ -109,14 +109,13 @@ class BlockNumbering:
     """Triangles and frame neighbours in the numbering that blocks are kept in."""
 
     def __init__(
-        self, order: NDArray[np.int64], triangles: NDArray[np.integer], neighbour: NDArray[np.integer]
+        self, filter_: SmoothingFilter, triangles: NDArray[np.integer], neighbour: NDArray[np.integer]
     ) -> None:
-        position = np.empty(len(order), dtype=np.int32)
-        position[order] = np.arange(len(order), dtype=np.int32)
+        position = filter_.position.astype(np.int32)
         renumbered = position[triangles]
         # In the order of their vertices, so that the scattered additions stay in the cache.
         self.triangles = np.ascontiguousarray(renumbered[np.argsort(renumbered.min(axis=1), kind="stable")])
-        self.neighbour = np.ascontiguousarray(position[np.asarray(neighbour)[order]])
+        self.neighbour = np.ascontiguousarray(position[np.asarray(neighbour)[filter_.order]])
 
 
 def decompose_block(
@@ -130,8 +129,8 @@ def decompose_block(
 ) -> None:
     """Decompose frames ``start <= t < stop`` into ``smooth_deltas`` and ``details``, both ``(B, V, 3)`` float32."""
     smooth, detail = decomposer.decompose(sequence.read(start, stop), motion, start)
-    block_to_frames(smooth, decomposer.filter.order, smooth_deltas)
-    block_to_frames(detail, decomposer.filter.order, details)
+    block_to_frames(smooth, decomposer.filter.position, smooth_deltas)
+    block_to_frames(detail, decomposer.filter.position, details)
 
 
 def frame_neighbours(vertices: Array, triangles: NDArray[np.integer]) -> NDArray[np.int64]:

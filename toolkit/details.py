@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from toolkit.coating_details import CoatingDetails
 from toolkit.decomposition import Decomposer
 from toolkit.errors import InputError
-from toolkit.kernels import add_head_motion, block_to_frames, frames_to_block, rotate_details
+from toolkit.kernels import place_frames, rotate_details
 from toolkit.mesh.geometry import vertex_areas
 from toolkit.operators import neighbour_average
 from toolkit.rigid import Similarity
@@ -162,9 +162,9 @@ class Reconstruction:
     def frames(self, start: int, stop: int, details: NDArray[np.float32], out: NDArray[np.float32]) -> None:
         """Write frames ``start <= t < stop`` to ``out`` (B, V, 3), from the source's motion details (B, V, 3)."""
         points = self._large_scale(start, stop)
-        points += self._detail_shift(points, details, start, stop)
-        add_head_motion(points, self._rotations[start:stop], self._translations[start:stop], self._scale)
-        block_to_frames(points, self._order, out)
+        shift = self._detail_shift(points, details, start, stop)
+        rotations, translations = self._rotations[start:stop], self._translations[start:stop]
+        place_frames(points, shift, self._target.filter.position, rotations, translations, self._scale, out)
 
     def detail_offsets(self, frame: int, details: NDArray[np.float32]) -> NDArray[np.float32]:
         """What details add to the large-scale shape of a frame, before the head's motion, ``(V, 3)``.
@@ -222,9 +222,8 @@ class Reconstruction:
     ) -> NDArray[np.float32]:
         """``G_t (own + gain details)`` as displacements, ``(V, 3, B)``."""
         shift = np.empty_like(points)
-        frames_to_block(details, self._order, *_no_motion(len(details)), np.zeros((len(points), 3)), shift)
         block = self._target.block
-        rotate_details(points, block.triangles, block.neighbour, scratch, shift, gain, own, shift)
+        rotate_details(points, block.triangles, block.neighbour, scratch, details, self._order, gain, own, shift)
         return shift
 
     def _ordered(self, change: BasesChange) -> NDArray[np.float32]:
@@ -257,10 +256,6 @@ def _placed(motion: HeadMotion, pose: Similarity, origin: Array) -> tuple[Array,
     rotations = pose.rotation @ motion.rotations
     moved = motion.rotations @ origin + motion.translations
     return rotations, pose.scale * moved @ pose.rotation.T + pose.translation
-
-
-def _no_motion(size: int) -> tuple[Array, Array]:
-    return np.tile(np.eye(3), (size, 1, 1)), np.zeros((size, 3))
 
 
 def detail_gain(parameters: DetailParameters, source: Array, target: Array, triangles: NDArray[np.integer]) -> Array:

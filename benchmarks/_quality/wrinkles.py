@@ -98,7 +98,7 @@ class _Details:
         still = HeadMotion(np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)))
         deltas, details = np.empty_like(frames), np.empty_like(frames)
         for block, out in zip(self.source.decompose(frames, still, 0), (deltas, details), strict=True):
-            block_to_frames(block, self.source.filter.order, out)
+            block_to_frames(block, self.source.filter.position, out)
         rest, triangles = self.source.rest.smooth, self.source.mesh.triangles
         gain = detail_gain(parameters, rest, self.target.rest.smooth, triangles)
         coating = None
