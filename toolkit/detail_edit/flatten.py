@@ -25,7 +25,7 @@ Complex = NDArray[np.complex128]
 Ids = NDArray[np.int64]
 
 _ROUNDS = 12
-_CANDIDATES = 24
+_CANDIDATES = (6, 32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,21 +99,26 @@ def located(places: Complex, triangles: Ids, queries: Complex) -> tuple[Ids, Arr
     area = _cross(b - a, c - a)
     upright = np.flatnonzero(area > 1e-12 * np.abs(area).max())
     middle = (a + b + c)[upright] / 3
-    count = min(_CANDIDATES, len(upright))
     tree = cKDTree(np.stack([middle.real, middle.imag], axis=1))
-    _, near = tree.query(np.stack([queries.real, queries.imag], axis=1), k=count)
-    near = upright[np.asarray(near).reshape(len(queries), count)]
-    q = queries[:, None]
-    second = _cross(q - a[near], (c - a)[near]) / area[near]
-    third = _cross((b - a)[near], q - a[near]) / area[near]
-    each = np.stack([1 - second - third, second, third], axis=2)
-    best = each.min(axis=2).argmax(axis=1)
-    rows = np.arange(len(queries))
-    chosen = each[rows, best]
-    inside = chosen.min(axis=1) > -1e-6
-    found[inside] = near[rows, best][inside]
-    weights[inside] = np.clip(chosen[inside], 0, 1)
-    weights[inside] /= weights[inside].sum(axis=1, keepdims=True)
+    # No point of a triangle is farther from its middle than its longest side is long.
+    reach = float(np.abs(np.stack([b - a, c - b, a - c])[:, upright]).max())
+    for candidates in _CANDIDATES:
+        rows = np.flatnonzero(found < 0)
+        count = min(candidates, len(upright))
+        at = np.stack([queries[rows].real, queries[rows].imag], axis=1)
+        distance, near = (np.reshape(x, (len(rows), count)) for x in tree.query(at, count, distance_upper_bound=reach))
+        close = np.isfinite(distance[:, 0])
+        rows, near = rows[close], upright[np.minimum(near[close], len(upright) - 1)]
+        q = queries[rows, None]
+        second = _cross(q - a[near], (c - a)[near]) / area[near]
+        third = _cross((b - a)[near], q - a[near]) / area[near]
+        each = np.stack([1 - second - third, second, third], axis=2)
+        best = each.min(axis=2).argmax(axis=1)
+        chosen, triangle = each[np.arange(len(rows)), best], near[np.arange(len(rows)), best]
+        inside = chosen.min(axis=1) > -1e-6
+        found[rows[inside]] = triangle[inside]
+        weights[rows[inside]] = np.clip(chosen[inside], 0, 1)
+    weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-300)
     return found, weights
 
 

@@ -12,7 +12,7 @@ import heapq
 import numpy as np
 from numba import njit
 
-__all__ = ["march"]
+__all__ = ["march", "seeds_round"]
 
 _OPTIONS = {"cache": True, "nogil": True, "fastmath": False, "boundscheck": False}
 
@@ -52,6 +52,30 @@ def _through(p, q, r, from_p, from_q, same):
 
 
 @njit(**_OPTIONS)
+def seeds_round(points, triangles, first, around, places, at):
+    """Vertices round surface points to start from, their straight distances, and which point each belongs to.
+
+    ``places`` (n, 3) and the triangles ``at`` (n,) that they lie in; the vertices of all triangles that touch these.
+    """
+    total = 0
+    for k in range(at.shape[0]):
+        for corner in range(3):
+            v = triangles[at[k], corner]
+            total += 3 * (first[v + 1] - first[v])
+    seeds, labels, starts = np.empty(total, np.int64), np.empty(total, np.int64), np.empty(total)
+    n = 0
+    for k in range(at.shape[0]):
+        for corner in range(3):
+            v = triangles[at[k], corner]
+            for j in range(first[v], first[v + 1]):
+                for other in range(3):
+                    w = triangles[around[j], other]
+                    seeds[n], labels[n], starts[n] = w, k, _corner(points[w], places[k])
+                    n += 1
+    return seeds, starts, labels
+
+
+@njit(**_OPTIONS)
 def march(points, triangles, first, around, seeds, starts, labels, limit):
     """Distance ``(V,)`` from the seeds along the mesh, infinite beyond ``limit``, and the nearest one's label ``(V,)``.
 
@@ -69,8 +93,11 @@ def march(points, triangles, first, around, seeds, starts, labels, limit):
         if starts[k] < distance[v]:
             distance[v], label[v] = starts[k], labels[k]
     for k in range(seeds.shape[0]):
-        if distance[seeds[k]] == starts[k]:
-            heapq.heappush(front, (distance[seeds[k]], np.int64(seeds[k])))
+        v = seeds[k]
+        if label[v] == labels[k] and distance[v] == starts[k] and not done[v]:
+            heapq.heappush(front, (distance[v], np.int64(v)))
+            done[v] = True  # that it waits, so that a seed given twice waits once
+    done[:] = False
     while len(front) > 0:
         d, v = heapq.heappop(front)
         if done[v]:

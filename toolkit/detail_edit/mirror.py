@@ -17,6 +17,7 @@ __all__ = ["Mirror"]
 Array = NDArray[np.float64]
 
 _SAMPLES = 3000
+_FEW = 600
 _ROUNDS = 30
 _WARP_ROUNDS = 3
 
@@ -85,11 +86,13 @@ class Mirror:
 
 
 def _best_plane(points: Array) -> tuple[Array, Array]:
+    """The plane that fits best from any of the three main axes; found on few points, then refined on all."""
     centre = points.mean(axis=0)
+    few = points[:: max(len(points) // _FEW, 1)]
     axes = np.linalg.eigh(np.cov((points - centre).T))[1].T
-    fits = [_fitted_plane(points, centre, axis) for axis in axes]
+    fits = [_fitted_plane(few, centre, axis) for axis in axes]
     _, point, normal = min(fits, key=lambda fit: fit[0])
-    return point, normal
+    return _fitted_plane(points, point, normal)[1:]
 
 
 def _fitted_plane(points: Array, point: Array, normal: Array) -> tuple[float, Array, Array]:
@@ -105,6 +108,8 @@ def _fitted_plane(points: Array, point: Array, normal: Array) -> tuple[float, Ar
         point = ((start + end) / 2).mean(axis=0)
         # Reflection takes s - m to e - m: their outer product is smallest along the normal.
         outer = (start - point).T @ (end - point)
-        values, vectors = np.linalg.eigh(outer + outer.T)
-        normal = vectors[:, np.argmin(values)]
+        _, vectors = np.linalg.eigh(outer + outer.T)
+        before, normal = normal, vectors[:, 0]
+        if abs(before @ normal) > 1 - 1e-12:
+            break
     return off, point, normal

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.detail_edit.marching import march
+from toolkit.detail_edit.marching import march, seeds_round
 from toolkit.errors import InputError
 from toolkit.mesh.topology import unique_edges
 
@@ -116,14 +116,9 @@ class Surface:
         """Distance along the surface ``(V,)`` from points or from a curve, infinite beyond ``limit``."""
         curve = sources if isinstance(sources, Curve) else as_curve(sources)
         self.check_triangles(curve.triangles)
-        places = self.places(curve)
-        seeds, starts, labels = [], [], []
-        for k, triangle in enumerate(curve.triangles):
-            near = np.unique(self.triangles[self.triangles_at(self.triangles[triangle])])
-            seeds.append(near)
-            starts.append(np.linalg.norm(self.vertices[near] - places[k], axis=1))
-            labels.append(np.full(len(near), k))
-        return self._march(np.concatenate(seeds), np.concatenate(starts), np.concatenate(labels), limit)
+        ground = (self.vertices, self.triangles, self._first, self._around)
+        seeds, starts, labels = seeds_round(*ground, self.places(curve), curve.triangles)
+        return self._march(seeds, starts, labels, limit)
 
     def distance_from_vertices(self, vertices: Ids, limit: float = np.inf, starts: Array | None = None) -> Array:
         """Distance ``(V,)`` from a set of vertices (n,), which start at 0 or at ``starts`` (n,)."""
