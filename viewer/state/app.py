@@ -441,7 +441,7 @@ class App:
             half = (last - first) // 2
             start = min(max(event.frame - half, 0), self.play.n_frames - 1 - (last - first))
             self.play.set_window(start, start + last - first)
-        self.mode.panel("window", self.play.window, True)
+        self.mode.panel("window", self.play.window, event.grip == "release")
         self.touch("timeline", "panel")
 
     def _task_failed(self, name: str, error: Exception) -> None:

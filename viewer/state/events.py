@@ -70,11 +70,14 @@ class PanelInput:
 
 @dataclass(frozen=True)
 class TimelineInput:
-    """The time line was used: ``what`` is scrub, first or last (ends of the window), or window (both, moved)."""
+    """The time line was used: ``what`` is scrub, first or last (ends of the window), or window (both, moved).
+
+    ``grip`` is press, drag or release.
+    """
 
     what: str
     frame: int
-    grip: str = "drag"
+    grip: str = "release"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,78 @@
+"""A soft round brush: where it touches while the pointer moves, how large it is, and its ring on the face."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from toolkit.detail_edit import Dab, SurfacePoint
+from viewer.modes.shared.ground import Ground
+from viewer.state.events import Hit, Pointer
+from viewer.state.marks import WHITE, Curve
+
+if TYPE_CHECKING:
+    from viewer.state.app import App
+
+__all__ = ["LARGEST", "SMALLEST", "Brush"]
+
+SMALLEST, LARGEST = 0.004, 0.3
+_STEP = 0.35  # touches of a stroke lie this share of the radius apart
+_MOST_TOUCHES = 24
+_RING = 40
+
+
+@dataclass
+class Brush:
+    """``radius`` as a share of the face's height, ``hardness`` 0 soft to 1 hard, ``strength`` of one touch."""
+
+    radius: float = 0.035
+    hardness: float = 0.4
+    strength: float = 1.0
+
+    def turned(self, notches: float) -> None:
+        """Larger by notches of the wheel."""
+        self.radius = float(np.clip(self.radius * 1.12**notches, SMALLEST, LARGEST))
+
+    def dabs(self, app: App, ground: Ground, last: Pointer | None, event: Pointer, erase: bool) -> list[Dab]:
+        """The touches from the last event to this one, none where the pointer is beside the face."""
+        radius = self.radius * app.surface(event.pane).framing.height / ground.scale
+        return [
+            Dab(SurfacePoint(hit.triangle, hit.barycentric), radius, self.strength, self.hardness, erase)
+            for hit in stroke(app, last, event, _STEP * self.radius)
+        ]
+
+    def ring(self, app: App, pane: int, hit: Hit) -> Curve:
+        """The brush's rim, laid on the face as the camera sees it."""
+        camera, surface = app.framing_camera(pane), app.surface(pane)
+        radius = self.radius * surface.framing.height
+        right, above, _ = camera.axes()
+        angle = np.linspace(0, 2 * np.pi, _RING, endpoint=False)
+        middle = np.asarray(hit.position)
+        rim = middle + radius * (np.cos(angle)[:, None] * right + np.sin(angle)[:, None] * above)
+        origin, picker = np.asarray(camera.position), app.picker(pane)
+        for index, point in enumerate(rim):
+            found = picker.along(origin, (point - origin) / np.linalg.norm(point - origin))
+            if found is not None and np.linalg.norm(np.subtract(found.position, middle)) < 2 * radius:
+                rim[index] = found.position
+        return Curve(rim, WHITE, 1.6, closed=True)
+
+
+def stroke(app: App, last: Pointer | None, event: Pointer, spacing: float) -> list[Hit]:
+    """Hits between two events of a drag, no farther apart than ``spacing`` in face heights, so that no gaps are left."""
+    if event.hit is None:
+        return []
+    if last is None or last.hit is None or last.pane != event.pane:
+        return [event.hit]
+    height = app.surface(event.pane).framing.height
+    gap = float(np.linalg.norm(np.subtract(event.hit.position, last.hit.position))) / height
+    count = int(np.clip(np.ceil(gap / max(spacing, 1e-9)), 1, _MOST_TOUCHES))
+    hits = []
+    start, end = np.asarray(last.direction), np.asarray(event.direction)
+    for share in np.arange(1, count) / count:
+        direction = (1 - share) * start + share * end
+        hit = app.picker(event.pane).along(event.origin, direction / np.linalg.norm(direction))
+        if hit is not None:
+            hits.append(hit)
+    return [*hits, event.hit]
