@@ -19,14 +19,16 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import eigh_tridiagonal, solveh_banded
 
+from toolkit.detail_edit.krylov import lanczos_steps
+
 __all__ = ["GradientWeights", "propagated", "region_laplacian", "time_matrix"]
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
 
 _TOLERANCE = 1e-11
-_CHECK_EVERY = 10
-_MOST_STEPS = 2000
+_STEPS = 40
+_MOST_STEPS = 4000
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ def propagated(
         values, vectors = eigh_tridiagonal(diagonals[:, c], subdiagonals[:, c])
         first = lengths[c] * vectors[0]
         spread = (right[:, None] * first) / (shifts[:, None] + values)
-        changes[:, :, c] = (modes @ spread @ vectors.T) @ basis[:, c]
+        changes[:, :, c] = (modes @ spread @ vectors.T) @ np.ascontiguousarray(basis[:, c])
     return changes
 
 
@@ -91,36 +93,25 @@ def _lanczos(matrix: sp.csr_matrix, start: Array, smallest: float) -> tuple[Arra
     orthogonality does no harm to solutions of linear systems: it only takes some steps more, as in conjugate gradients.
     """
     n, columns = start.shape
-    current = start / np.maximum(np.sqrt((start**2).sum(axis=0)), 1e-300)
-    before, beta = np.zeros_like(current), np.zeros(columns)
-    basis: list[Array] = []
-    alphas: list[Array] = []
-    betas: list[Array] = []
-    while len(basis) < _MOST_STEPS:
-        basis.append(np.ascontiguousarray(current.T))
-        after = matrix @ current - beta * before
-        alpha = np.einsum("nc,nc->c", after, current)
-        after -= alpha * current
-        beta = np.sqrt(np.einsum("nc,nc->c", after, after))
-        alphas.append(alpha)
-        if len(basis) % _CHECK_EVERY == 0 or len(basis) >= n:
-            residual = _residual(np.array(alphas), np.array(betas).reshape(-1, columns), beta, smallest)
-            if residual < _TOLERANCE or len(basis) >= 2 * n + _CHECK_EVERY:
-                break
-        betas.append(beta)
-        before, current = current, after / np.maximum(beta, 1e-300)
-    return np.stack(basis), np.array(alphas), np.array(betas).reshape(-1, columns)
+    basis = np.zeros((1, columns, n))
+    basis[0] = (start / np.maximum(np.sqrt((start**2).sum(axis=0)), 1e-300)).T
+    alphas, betas = np.zeros((0, columns)), np.zeros((0, columns))
+    while True:
+        done, steps = len(alphas), len(alphas) + _STEPS
+        basis = np.concatenate([basis, np.zeros((_STEPS, columns, n))])
+        alphas, betas = (np.concatenate([x, np.zeros((_STEPS, columns))]) for x in (alphas, betas))
+        lanczos_steps(matrix.indptr, matrix.indices, matrix.data, basis, alphas, betas, done, steps)
+        if _residual(alphas, betas, smallest) < _TOLERANCE or steps >= _MOST_STEPS:
+            return basis[:-1], alphas, betas[:-1]
 
 
-def _residual(alphas: Array, betas: Array, last: Array, shift: float) -> float:
+def _residual(alphas: Array, betas: Array, shift: float) -> float:
     """Largest residual of ``(T + shift I) y = e_1`` over the columns, as the Lanczos relation gives it."""
     worst = 0.0
+    unit = np.zeros(len(alphas))
+    unit[0] = 1
     for c in range(alphas.shape[1]):
-        # One row of padding: the solver does not take a single unknown.
-        banded = np.zeros((2, len(alphas) + 1))
-        banded[0, :-1], banded[0, -1] = alphas[:, c] + shift, 1
-        banded[1, : len(betas)] = betas[:, c]
-        unit = np.zeros(len(alphas) + 1)
-        unit[0] = 1
-        worst = max(worst, float(abs(last[c] * solveh_banded(banded, unit, lower=True)[-2])))
+        banded = np.stack([alphas[:, c] + shift, betas[:, c]])
+        solved = solveh_banded(banded, unit, lower=True)
+        worst = max(worst, float(abs(betas[-1, c] * solved[-1])))
     return worst
