@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import shutil
 import signal
 import sys
 from collections.abc import Iterator
@@ -16,9 +17,11 @@ import pytest
 from toolkit import cluster as cluster_module
 from toolkit.blocks import map_blocks
 from toolkit.cluster import Cluster
+from toolkit.editing import EditSession
 from toolkit.errors import InputError
 from toolkit.mesh import TriangleMesh
 from toolkit.meshio import write_mesh
+from toolkit.pose_edit import EditParameters, PointConstraint
 from toolkit.shot import Shot
 from toolkit.stages import run_stages
 from toolkit.stages.blocks import StageBlocks
@@ -101,6 +104,21 @@ def test_a_lost_workers_chunk_is_done_again(
     assert str(os.getpid()) not in died
     for stage, name in ARRAYS:
         assert here.array(stage, name).tobytes() == there.array(stage, name).tobytes(), name
+
+
+def test_edits_go_along(bump: TriangleMesh, take: np.ndarray, tmp_path: Path, scheduler: str) -> None:
+    here, there = (make_shot(tmp_path / name, bump, take) for name in ("here", "there"))
+    run_stages(here)
+    unedited = here.frames_path.read_bytes()
+    session = EditSession.open(here)
+    session.draft_pose([PointConstraint(100, 360, offset=(0.0, 0.05, 0.0))], EditParameters(window=(80, 130)))
+    session.commit()
+    shutil.copy(here.edits_path, there.edits_path)
+    run_stages(here)
+    with Cluster(scheduler) as cluster:
+        run_stages(there, map_blocks=cluster.map_blocks)
+    assert here.frames_path.read_bytes() == there.frames_path.read_bytes()
+    assert here.frames_path.read_bytes() != unedited
 
 
 def test_an_error_on_a_worker_is_raised_here_as_it_was(tmp_path: Path, scheduler: str) -> None:
