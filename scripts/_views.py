@@ -7,7 +7,7 @@ import argparse
 __all__ = ["add_axes", "numbers_list", "vector"]
 
 
-def add_axes(parser: argparse.ArgumentParser) -> None:
+def add_axes(parser: argparse._ActionsContainer) -> None:
     """Which way the source's face looks; on the target the registration tells."""
     parser.add_argument(
         "--forward", type=vector, default=(0.0, 0.0, 1.0), metavar="X,Y,Z", help="out of the source's face (0,0,1)"

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from toolkit.blocks import block_ranges, block_size
 from toolkit.editing.stack import State
 
-__all__ = ["moved_by"]
+__all__ = ["moved_by", "n_moved"]
 
 Array = NDArray[np.float64]
 
@@ -22,6 +22,12 @@ def moved_by(state: State) -> Array:
     at all vertices; the larger of the two.
     """
     return np.maximum(_large_scale(state), _details(state)) * state.opened.placement.scale
+
+
+def n_moved(moved: Array) -> int:
+    """How many frames are moved to speak of: by 1 % or more of the one moved farthest."""
+    farthest = float(moved.max(initial=0))
+    return int(np.count_nonzero(moved >= 0.01 * farthest)) if farthest > 0 else 0
 
 
 def _large_scale(state: State) -> Array:

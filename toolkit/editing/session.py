@@ -196,6 +196,10 @@ class EditSession:
         with self._lock:
             return self._stack.opened.detail_solver.take.changed(*self._committed.changes)
 
+    def in_pose_of_bases(self, length: float) -> float:
+        """A length of the result's unit as one of `detail_take`'s."""
+        return length / self._stack.opened.placement.scale
+
     def drop_draft(self) -> None:
         """Forget the draft."""
         with self._lock:

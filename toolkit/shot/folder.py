@@ -75,6 +75,11 @@ class Shot:
         return self.path / "edits.jsonl"
 
     @property
+    def regions_path(self) -> Path:
+        """``regions.json``, parts of the face that users have named."""
+        return self.path / "regions.json"
+
+    @property
     def frames_path(self) -> Path:
         """``result/frames.npy`` (T, V, 3) float32, in the target's unit and place."""
         return self.path / "result" / "frames.npy"

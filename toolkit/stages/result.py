@@ -84,6 +84,8 @@ def active_edits(shot: Shot) -> tuple[Edit, ...]:
 
 
 def _save_edits(shot: Shot, folder: StageFolder, edits: AppliedEdits) -> None:
+    from toolkit.editing.moved import n_moved
+
     record: dict[str, Any] = {"edits": edits.record}
     (folder.path / _RECORD).write_text(json.dumps(record), encoding="utf-8")
     moved = edits.moved()
@@ -92,7 +94,7 @@ def _save_edits(shot: Shot, folder: StageFolder, edits: AppliedEdits) -> None:
     folder.save("morphs", edits.morphs(np.array(shot.array("bases", "frames"))))
     folder.numbers |= {
         "edits": len(edits.record),
-        "edited_frames": int(np.count_nonzero(moved)),
+        "edited_frames": n_moved(moved),
         "edits_move_at_most": float(moved.max()),
     }
 
