@@ -16,6 +16,7 @@ from scipy.linalg.blas import dsyrk, ssyrk
 
 from toolkit.errors import InputError
 from toolkit.progress import Progress, silent
+from toolkit.steadying import steady_weights
 
 __all__ = ["BasisParameters", "BasisSelection", "gram_matrix", "non_negative_weights", "select_bases"]
 
@@ -23,6 +24,8 @@ Array = NDArray[np.float64]
 
 _SHORT_LIST = 6
 _CHUNK_COLUMNS = 16384
+_EXACT = 1e-6
+"""Share of the motion below which nothing is left out that could tremble."""
 
 
 @dataclass(frozen=True)
@@ -31,20 +34,23 @@ class BasisParameters:
 
     ``threshold`` root mean square error as a share of the take's own RMS motion (0 makes every moving frame a basis);
     ``threshold_length`` the same as a length in mesh units, if given; ``count`` the most bases, if given.
-    ``contact_share`` is how much the gaps of lids and lips count in the fit, beside the vertices.
+    ``contact_share`` is how much the gaps of lids and lips count in the fit, beside the vertices; ``steadiness`` how
+    much it sees the frames before and after (`toolkit.steadying`), 0 to fit every frame alone as the paper does.
     """
 
     threshold: float = 0.03
     threshold_length: float | None = None
     count: int | None = None
     contact_share: float = 1.0
+    steadiness: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.threshold < 0 or (self.threshold_length or 0) < 0 or (self.count is not None and self.count < 1):
+        wrong = self.threshold < 0 or (self.threshold_length or 0) < 0 or (self.count is not None and self.count < 1)
+        if wrong or self.steadiness < 0:
             raise InputError(
                 f"bases with threshold = {self.threshold}, threshold_length = {self.threshold_length}, "
-                f"count = {self.count} make no sense",
-                remedy="give non-negative thresholds and a count of at least 1",
+                f"count = {self.count}, steadiness = {self.steadiness} make no sense",
+                remedy="give non-negative thresholds and steadiness, and a count of at least 1",
             )
 
 
@@ -125,7 +131,12 @@ def select_bases(
         weights[frames] = np.eye(len(frames))
         errors += [errors[-1]] * (len(rest) - 1) + [0.0] * bool(len(rest))
     chosen = np.array(frames, dtype=np.int64)
-    frame_errors = np.sqrt(_squared_errors(positions, chosen, weights) / n_vertices)
+    squared = _squared_errors(positions, chosen, weights)
+    if frames and errors[-1] > _EXACT * motion and parameters.steadiness > 0:
+        weights = steady_weights(gram[np.ix_(chosen, chosen)], gram[:, chosen], weights, parameters.steadiness)
+        squared = _squared_errors(positions, chosen, weights, exact=False)
+        errors[-1] = float(np.sqrt(squared.sum() * per_length))
+    frame_errors = np.sqrt(squared / n_vertices)
     return BasisSelection(chosen, weights, np.array(errors), frame_errors)
 
 
@@ -161,7 +172,8 @@ def _explained(gram: Array, frames: list[int], weights: Array) -> Array:
     return np.where(own > floor, gains, 0.0)
 
 
-def _squared_errors(gram: Array, frames: NDArray[np.int64], weights: Array) -> Array:
+def _squared_errors(gram: Array, frames: NDArray[np.int64], weights: Array, *, exact: bool = True) -> Array:
+    """Squared errors ``(T,)`` of all vertices; ``exact`` where every basis is its own frame."""
     inner = gram[np.ix_(frames, frames)]
     squared = (
         np.diag(gram)
@@ -169,7 +181,8 @@ def _squared_errors(gram: Array, frames: NDArray[np.int64], weights: Array) -> A
         + np.einsum("tk,tk->t", weights @ inner, weights)
     )
     squared = np.maximum(squared, 0)
-    squared[frames] = 0
+    if exact:
+        squared[frames] = 0
     return squared
 
 
@@ -187,64 +200,84 @@ def non_negative_weights(inner: Array, coupling: Array, start: Array | None = No
     return _active_sets(scaled, np.ascontiguousarray(coupling / scale), np.ascontiguousarray(start * scale)) / scale
 
 
-@njit(cache=True, nogil=True)
-def _solve_passive(inner, right, passive):  # type: ignore[no-untyped-def]  # compiled
-    """Least squares on the passive set alone, zero elsewhere."""
-    ids = np.flatnonzero(passive)
-    solution = np.zeros(len(right))
-    if len(ids) == 0:
-        return solution
-    matrix = np.empty((len(ids), len(ids)))
-    vector = np.empty(len(ids))
-    for a in range(len(ids)):
-        vector[a] = right[ids[a]]
-        for b in range(len(ids)):
-            matrix[a, b] = inner[ids[a], ids[b]]
-        # Frames that nearly repeat each other must not make the small system singular.
-        matrix[a, a] += 1e-12
-    part = np.linalg.solve(matrix, vector)
-    for a in range(len(ids)):
-        solution[ids[a]] = part[a]
-    return solution
+# Plain loops: what numba brings for arrays and linear algebra takes seconds to compile and to load.
+@njit(cache=True, nogil=True, error_model="numpy")
+def _solve_passive(inner, right, passive, root, ids, trial):  # type: ignore[no-untyped-def]  # compiled
+    """Least squares on the passive set alone, zero elsewhere, to ``trial``; ``root`` and ``ids`` are scratch."""
+    n = 0
+    for k in range(len(right)):
+        trial[k] = 0.0
+        if passive[k]:
+            ids[n] = k
+            n += 1
+    for a in range(n):
+        value = right[ids[a]]
+        for b in range(a + 1):
+            entry = inner[ids[a], ids[b]]
+            for c in range(b):
+                entry -= root[a, c] * root[b, c]
+            # Frames that nearly repeat each other must not make the small system singular.
+            root[a, b] = np.sqrt(max(entry, 0.0) + 1e-12) if a == b else entry / root[b, b]
+            if b < a:
+                value -= root[a, b] * trial[ids[b]]
+        trial[ids[a]] = value / root[a, a]
+    for a in range(n - 1, -1, -1):
+        value = trial[ids[a]]
+        for c in range(a + 1, n):
+            value -= root[c, a] * trial[ids[c]]
+        trial[ids[a]] = value / root[a, a]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _steepest(inner, right, w, passive, tolerance):  # type: ignore[no-untyped-def]  # compiled
+    """The active weight whose growth lowers the error most, or -1."""
+    best, best_value = -1, tolerance
+    for k in range(len(w)):
+        if not passive[k]:
+            gradient = right[k]
+            for i in range(len(w)):
+                gradient -= inner[k, i] * w[i]
+            if gradient > best_value:
+                best, best_value = k, gradient
+    return best
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _active_sets(inner, coupling, start):  # type: ignore[no-untyped-def]  # compiled
     n_frames, n_bases = coupling.shape
     result = np.zeros((n_frames, n_bases))
+    root, trial = np.zeros((n_bases, n_bases)), np.zeros(n_bases)
+    ids, passive = np.zeros(n_bases, np.int64), np.zeros(n_bases, np.bool_)
     for t in range(n_frames):
-        right = coupling[t]
-        tolerance = 1e-10 * max(np.max(np.abs(right)), 1e-300)
-        w = np.maximum(start[t], 0.0)
-        passive = w > 0
-        first = True
-        for _ in range(10 * n_bases + 10):
-            if not first:
-                gradient = right - inner @ w
-                best, best_value = -1, tolerance
-                for k in range(n_bases):
-                    if not passive[k] and gradient[k] > best_value:
-                        best, best_value = k, gradient[k]
+        right, w = coupling[t], result[t]
+        tolerance = 1e-300
+        for k in range(n_bases):
+            tolerance = max(tolerance, 1e-10 * abs(right[k]))
+            w[k] = max(start[t, k], 0.0)
+            passive[k] = w[k] > 0
+        for turn in range(10 * n_bases + 10):
+            if turn > 0:
+                best = _steepest(inner, right, w, passive, tolerance)
                 if best < 0:
                     break
                 passive[best] = True
-            first = False
             for _ in range(3 * n_bases + 3):
-                trial = _solve_passive(inner, right, passive)
+                _solve_passive(inner, right, passive, root, ids, trial)
                 step, blocking = 1.0, -1
                 for k in range(n_bases):
                     if passive[k] and trial[k] <= 0:
                         ratio = w[k] / (w[k] - trial[k]) if w[k] > trial[k] else 0.0
                         if ratio < step:
                             step, blocking = ratio, k
-                w = w + step * (trial - w)
-                if blocking < 0:
-                    break
                 for k in range(n_bases):
-                    if passive[k] and (k == blocking or w[k] <= 1e-14):
+                    w[k] += step * (trial[k] - w[k])
+                    if blocking >= 0 and passive[k] and (k == blocking or w[k] <= 1e-14):
                         passive[k] = False
                         w[k] = 0.0
-        result[t] = np.maximum(w, 0.0)
+                if blocking < 0:
+                    break
+        for k in range(n_bases):
+            w[k] = max(w[k], 0.0)
     return result
 
 

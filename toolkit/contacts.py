@@ -94,15 +94,20 @@ def find_contacts(openings: Sequence[Opening], reference: Array, frames: NDArray
 
 
 def _nearest_across(frames: NDArray[np.floating], side: Ids, other: Ids, corners: Ids) -> tuple[Ids, Ids, Array, Ids]:
-    points = frames[:, side].astype(np.float64)
-    starts, ends = frames[:, other[:-1]].astype(np.float64), frames[:, other[1:]].astype(np.float64)
+    # About their middle, so that squares of positions do not swallow those of distances.
+    middle = frames[0, side].mean(axis=0)
+    points = (frames[:, side] - middle).astype(np.float64)
+    starts, ends = ((frames[:, ids] - middle).astype(np.float64) for ids in (other[:-1], other[1:]))
     direction = ends - starts
-    squared = np.maximum(np.sum(direction**2, axis=2), 1e-30)
-    to_point = points[:, :, None] - starts[:, None]
-    share = np.clip(np.einsum("tnmi,tmi->tnm", to_point, direction) / squared[:, None], 0, 1)
-    distance = np.linalg.norm(to_point - share[..., None] * direction[:, None], axis=3)
-    flat = distance.transpose(1, 0, 2).reshape(len(side), -1)
-    frame, segment = np.divmod(np.argmin(flat, axis=1), distance.shape[2])
+    squared = np.maximum(np.sum(direction**2, axis=2), 1e-30)[:, None]
+    # |p - s - a d|^2 from products of matrices, (T, n, m): nothing with a fourth axis is made.
+    along = points @ direction.transpose(0, 2, 1) - np.sum(starts * direction, axis=2)[:, None]
+    share = np.clip(along / squared, 0, 1)
+    distance = np.sum(points**2, axis=2)[:, :, None] + np.sum(starts**2, axis=2)[:, None]
+    distance -= 2 * (points @ starts.transpose(0, 2, 1))
+    distance -= share * (2 * along - share * squared)
+    nearest = np.argmin(distance.transpose(1, 0, 2).reshape(len(side), -1), axis=1)
+    frame, segment = np.divmod(nearest, distance.shape[2])
     edge = np.stack([other[segment], other[segment + 1]], axis=1)
     chosen = share[frame, np.arange(len(side)), segment]
     return side, edge, chosen, np.tile(corners, (len(side), 1))

@@ -59,7 +59,7 @@ def fit_head_motion(
     picks = np.unique(np.linspace(0, len(reference) - 1, min(_SAMPLE, len(reference))).astype(int))
     points = np.empty((sequence.n_frames, len(picks), 3))
     for start, stop in sequence.blocks():
-        points[start:stop] = sequence.read(start, stop)[:, picks]
+        points[start:stop] = sequence.read(start, stop, picks)
         progress("finding the head's motion", stop, sequence.n_frames)
     rest = np.asarray(reference, dtype=np.float64)[picks]
     return rigid_fits(rest, points, stable_weights(rest, points))
@@ -71,25 +71,34 @@ def stable_weights(rest: Array, points: Array) -> Array:
     Iteratively re-weighted with Geman-McClure's weight ``1 / (1 + (r / sigma)^2)^2``, ``r`` the vertex's RMS residual
     over all frames, ``sigma`` the residual of the quietest fifth. ``rest`` (n, 3), ``points`` (T, n, 3).
     """
-    weights = np.ones(len(rest))
+    n, n_frames = len(rest), len(points)
+    weights = np.ones(n)
     smallest = 1e-9 * float(np.linalg.norm(np.ptp(rest, axis=0)))
+    # Vertex by vertex, so that all frames are one product of matrices.
+    rows = np.ascontiguousarray(points.transpose(1, 0, 2)).reshape(n, -1)
     for _ in range(_ROUNDS):
-        motion = rigid_fits(rest, points, weights)
-        fitted = rest @ motion.rotations.transpose(0, 2, 1) + motion.translations[:, None]
-        fitted -= points
-        residual = np.sqrt(np.einsum("tni,tni->n", fitted, fitted) / len(points))
-        sigma = max(float(np.quantile(residual, _STABLE_SHARE)), smallest)
-        weights = 1 / (1 + (residual / sigma) ** 2) ** 2
+        motion = _rigid_fits(rest, rows, weights)
+        residual = rest @ motion.rotations.reshape(-1, 3).T
+        residual += motion.translations.ravel()
+        residual -= rows
+        length = np.sqrt(np.einsum("ni,ni->n", residual, residual) / n_frames)
+        sigma = max(float(np.quantile(length, _STABLE_SHARE)), smallest)
+        weights = 1 / (1 + (length / sigma) ** 2) ** 2
     return weights
 
 
 def rigid_fits(rest: Array, points: Array, weights: Array) -> HeadMotion:
     """Weighted Kabsch for every frame at once: ``argmin sum_v w_v |R_t rest_v + t_t - points_tv|^2``."""
+    return _rigid_fits(rest, points.transpose(1, 0, 2).reshape(len(rest), -1), weights)
+
+
+def _rigid_fits(rest: Array, rows: Array, weights: Array) -> HeadMotion:
+    """As `rigid_fits`, from points ``(n, 3T)``."""
     share = weights / weights.sum()
     rest_mean = share @ rest
-    means = share @ points
+    means = (share @ rows).reshape(-1, 3)
     # The weighted rest points sum to zero, so the frames need no centring.
-    covariance = points.transpose(0, 2, 1) @ ((rest - rest_mean) * share[:, None])
+    covariance = (((rest - rest_mean) * share[:, None]).T @ rows).reshape(3, -1, 3).transpose(1, 2, 0)
     u, _, vt = np.linalg.svd(covariance)
     sign = np.linalg.det(u @ vt)
     u[:, :, 2] *= sign[:, None]

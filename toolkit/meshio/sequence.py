@@ -45,13 +45,17 @@ class FrameSequence:
     def __len__(self) -> int:
         return self.n_frames
 
-    def read(self, start: int, stop: int) -> NDArray[np.float32]:
-        """Return frames ``start <= t < stop`` as ``(stop - start, V, 3)`` float32, a copy of the caller's own."""
+    def read(self, start: int, stop: int, vertices: NDArray[np.integer] | None = None) -> NDArray[np.float32]:
+        """Return frames ``start <= t < stop`` as ``(stop - start, V, 3)`` float32, a copy of the caller's own.
+
+        With ``vertices`` (n,) only these, ``(stop - start, n, 3)``.
+        """
         if not 0 <= start <= stop <= self.n_frames:
             raise IndexError(f"frames {start}:{stop} are outside 0:{self.n_frames} of {self.where}")
         if start == stop:
-            return np.zeros((0, self.n_vertices, 3), dtype=np.float32)
-        return np.array(self.read_block(start, stop), dtype=np.float32, order="C")
+            return np.zeros((0, self.n_vertices if vertices is None else len(vertices), 3), dtype=np.float32)
+        block = self.read_block(start, stop)
+        return np.array(block if vertices is None else block[:, vertices], dtype=np.float32, order="C")
 
     def blocks(self) -> Iterator[tuple[int, int]]:
         """Yield ``(start, stop)`` over all frames, in blocks of about 64 MB."""

@@ -68,7 +68,7 @@ def _contacts(
     ids = np.unique(np.concatenate([np.zeros(0, dtype=np.int64)] + [np.r_[o.upper, o.lower] for o in openings]))
     points = np.empty((sequence.n_frames, len(ids), 3))
     for start, stop in sequence.blocks():
-        points[start:stop] = sequence.read(start, stop)[:, ids]
+        points[start:stop] = sequence.read(start, stop, ids)
         progress("reading the rims of lids and lips", stop, sequence.n_frames)
     points = np.einsum("tji,tnj->tni", motion.rotations, points - motion.translations[:, None])
     compact = [Opening(o.name, np.searchsorted(ids, o.upper), np.searchsorted(ids, o.lower)) for o in openings]

@@ -79,7 +79,9 @@ def _system(shot: Shot, target: Decomposer, shapes: np.ndarray, motion: np.ndarr
 
 def _motion(deltas: np.ndarray) -> np.ndarray:
     """How far each vertex moves at most over the take, ``(V,)``."""
-    farthest = np.zeros(deltas.shape[1])
+    farthest = np.zeros(deltas.shape[1], dtype=deltas.dtype)
+    squares = np.empty_like(deltas[0])
     for frame in deltas:
-        np.maximum(farthest, np.einsum("vi,vi->v", frame, frame), out=farthest)
-    return np.sqrt(farthest)
+        np.multiply(frame, frame, out=squares)
+        np.maximum(farthest, squares[:, 0] + squares[:, 1] + squares[:, 2], out=farthest)
+    return np.sqrt(farthest.astype(np.float64))
