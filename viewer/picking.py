@@ -1,7 +1,7 @@
 """Picking: a ray against the displayed mesh on the CPU, and the vertex that the user points at.
 
-The answer is never a vertex on the back of the face or on the other lip: candidates are the corners of the triangles
-that touch the one hit, and of those only the ones that a ray from the camera reaches.
+The answer is never a vertex on the back of the face or on the other lip: candidates are reached over the surface from
+the triangle that the ray hits, and of those only the ones that a ray from the camera reaches.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 # A click that misses the outline by this many pixels still counts, or vertices on it could hardly be picked.
 _REACH = 4
+_RINGS = 12
 
 
 class Picker:
@@ -85,20 +86,26 @@ class Picker:
 
     def visible(self, ids: NDArray[np.integer], camera: Camera) -> NDArray[np.bool_]:
         """Mask ``(n,)`` of the vertices that the camera sees."""
-        return self.sees(self.vertices[ids], camera)
+        ids = np.asarray(ids)
+        seen, first = self._looked_at(self.vertices[ids], camera)
+        # Where the surface is seen edge on, rounding may hit a triangle of the vertex itself a little before it.
+        own = (self.triangles[np.minimum(first, len(self.triangles) - 1)] == ids[:, None]).any(axis=1)
+        return np.asarray(seen | (own & (first < len(self.triangles))))
 
     def sees(self, places: NDArray[np.floating], camera: Camera) -> NDArray[np.bool_]:
         """Mask ``(n,)`` of the places (n, 3) on the surface that the camera sees."""
+        return self._looked_at(places, camera)[0]
+
+    def _looked_at(self, places: NDArray[np.floating], camera: Camera) -> tuple[NDArray[np.bool_], NDArray[np.integer]]:
         points = np.asarray(places, dtype=np.float64).reshape(-1, 3)
         if not len(points):
-            return np.zeros(0, dtype=bool)
+            return np.zeros(0, dtype=bool), np.zeros(0, dtype=np.int64)
         origin = np.asarray(camera.position)
         reach = np.linalg.norm(points - origin, axis=1)
         rays = np.concatenate([np.broadcast_to(origin, points.shape), (points - origin) / reach[:, None]], axis=1)
         answer = self._scene.cast_rays(self._tensor(rays.astype(np.float32)), nthreads=1)
-        seen = answer["t_hit"].numpy()
-        # The ray may graze a triangle of the vertex itself, or slip between two of them.
-        return np.asarray(seen >= reach * (1 - 1e-4))
+        # The ray may also slip between two triangles, and hit nothing.
+        return answer["t_hit"].numpy() >= reach * (1 - 1e-4), answer["primitive_ids"].numpy().astype(np.int64)
 
     def _first(self, origin: Array, directions: Array) -> list[tuple[int, Array] | None]:
         rays = np.concatenate([np.broadcast_to(origin, directions.shape), directions], axis=1).astype(np.float32)
@@ -120,26 +127,32 @@ class Picker:
         return next((hit for hit in found if hit is not None), None)
 
     def _nearest_vertex(self, triangle: int, camera: Camera, at: tuple[float, float], size: tuple[int, int]) -> int:
+        """The visible vertex nearest to ``at``, reached over the surface from ``triangle``."""
         own = self.triangles[triangle]
         starts, members = self._neighbours
-        around = np.concatenate([members[starts[v] : starts[v + 1]] for v in own])
-        candidates = np.unique(self.triangles[around])
-        flat = camera.project(self.vertices[candidates], size)
-        apart = np.hypot(flat[:, 0] - at[0], flat[:, 1] - at[1])
-        for index in np.argsort(apart, kind="stable"):
-            if self.visible(candidates[index : index + 1], camera)[0]:
-                return int(candidates[index])
+        best, nearest, reach = np.inf, -1, np.inf
+        known = np.zeros(0, dtype=np.int64)
+        frontier = np.asarray(own, dtype=np.int64)
+        for ring in range(_RINGS):
+            around = np.unique(np.concatenate([members[starts[v] : starts[v + 1]] for v in frontier]))
+            new = np.setdiff1d(self.triangles[around], known)
+            known = np.union1d(known, new)
+            flat = camera.project(self.vertices[new], size)
+            apart = np.hypot(flat[:, 0] - at[0], flat[:, 1] - at[1])
+            for index in np.argsort(apart, kind="stable"):
+                if apart[index] >= best:
+                    break
+                if self.visible(new[index : index + 1], camera)[0]:
+                    best, nearest = float(apart[index]), int(new[index])
+            # Where triangles are smaller than a pixel, or seen edge on, the nearest one may be some rings away.
+            reach = float(apart.max()) if ring == 0 else reach
+            frontier = new[apart <= max(reach, best)]
+            if not len(frontier):
+                break
+        if nearest >= 0:
+            return nearest
         corner = camera.project(self.vertices[own], size)
         return int(own[np.argmin(np.hypot(corner[:, 0] - at[0], corner[:, 1] - at[1]))])
-
-    def near(self, points: Array, camera: Camera, at: tuple[float, float], size: tuple[int, int], pixels: float) -> int:
-        """Index of the point (n, 3) nearest on the screen within ``pixels``, or -1."""
-        if not len(points):
-            return -1
-        flat = camera.project(points, size)
-        apart = np.hypot(flat[:, 0] - at[0], flat[:, 1] - at[1])
-        best = int(np.argmin(apart))
-        return best if apart[best] <= pixels else -1
 
 
 def ray_distance(origin: Array, direction: Array, points: NDArray[np.floating]) -> Array:
