@@ -24,6 +24,7 @@ from viewer.modes.shared.brush import Brush
 from viewer.modes.shared.ground import Grounds
 from viewer.modes.shared.open_edit import OpenEdit
 from viewer.modes.shared.pointing import on_plane, pointed_at, shows_result
+from viewer.picking import Picker
 from viewer.state.events import Hit, Key, Pointer
 from viewer.state.marks import Mark
 from viewer.state.rows import Row
@@ -72,7 +73,7 @@ class PoseEdit(OpenEdit[PoseDraft]):
         self._base: Any = None
         self._frames: dict[int, NDArray[np.float32]] = {}
         self._grab: _Grab | None = None
-        self._stroke: tuple[Pointer, PoseDraft | None] | None = None
+        self._stroke: tuple[Pointer | None, PoseDraft | None, Picker] | None = None
 
     # -- life -----------------------------------------------------------------------------------------------------
 
@@ -162,8 +163,8 @@ class PoseEdit(OpenEdit[PoseDraft]):
         if self.tool == "move":
             return self._take_hold(event)
         if self.tool == "fix" and event.hit is not None:
-            self._stroke = (event, self.draft)
-            self._paint(None, event)
+            self._stroke = (None, self.draft, self.app.picker(event.pane))
+            self.drag(event)
             return True
         return False
 
@@ -174,10 +175,11 @@ class PoseEdit(OpenEdit[PoseDraft]):
             if place is not None:
                 self._move_to(self._grab, self._grab.goal + place - self._grab.anchor)
         elif self._stroke is not None:
-            last, before = self._stroke
-            self._stroke = (event, before)
+            last, before, picker = self._stroke
+            event = replace(event, hit=picker.along(event.origin, event.direction) or event.hit)
+            self._stroke = (event, before, picker)
             self.under = (event.pane, event.hit) if event.hit is not None else None
-            self._paint(last, event)
+            self._paint(last, event, picker)
 
     def release(self, event: Pointer) -> None:
         """The gesture is done: remember it for undo, keep it on disk, solve to the end."""
@@ -190,7 +192,7 @@ class PoseEdit(OpenEdit[PoseDraft]):
             self._grab = None
             self.done_with(grab.before)
         elif self._stroke is not None:
-            _, before = self._stroke
+            before = self._stroke[1]
             self._stroke = None
             self.done_with(before)
 
@@ -301,12 +303,12 @@ class PoseEdit(OpenEdit[PoseDraft]):
             self.done_with(before)
         self.app.touch("overlay", "panel", "status")
 
-    def _paint(self, last: Pointer | None, event: Pointer) -> None:
+    def _paint(self, last: Pointer | None, event: Pointer, picker: Picker) -> None:
         ground = self.grounds.ground
         if ground is None:
             return
         draft = self._begun()
-        dabs = self.brush.dabs(self.app, ground, last, event, "shift" in event.modifiers)
+        dabs = self.brush.dabs(self.app, ground, last, event, "shift" in event.modifiers, picker)
         if dabs:
             hard = [replace(dab, hardness=1.0, strength=1.0) for dab in dabs]
             held = painted(ground.surface, hard, Region.whole(draft.fixed))
@@ -385,7 +387,7 @@ class PoseEdit(OpenEdit[PoseDraft]):
         if tool not in dict(TOOLS):
             raise InputError(f"there is no tool {tool!r}", remedy=f"tools are {', '.join(dict(TOOLS))}")
         self.tool, self.pending, self.under = tool, None, None
-        self.hits_in_drag = self.hovers = tool == "fix"
+        self.hovers = tool == "fix"
         self.app.touch("overlay", "panel", "status")
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from toolkit.detail_edit import Dab, SurfacePoint
 from viewer.modes.shared.ground import Ground
+from viewer.picking import Picker
 from viewer.state.events import Hit, Pointer
 from viewer.state.marks import WHITE, Curve
 
@@ -35,12 +36,14 @@ class Brush:
         """Larger by notches of the wheel."""
         self.radius = float(np.clip(self.radius * 1.12**notches, SMALLEST, LARGEST))
 
-    def dabs(self, app: App, ground: Ground, last: Pointer | None, event: Pointer, erase: bool) -> list[Dab]:
+    def dabs(
+        self, app: App, ground: Ground, last: Pointer | None, event: Pointer, erase: bool, picker: Picker
+    ) -> list[Dab]:
         """The touches from the last event to this one, none where the pointer is beside the face."""
         radius = self.radius * app.surface(event.pane).framing.height / ground.scale
         return [
             Dab(SurfacePoint(hit.triangle, hit.barycentric), radius, self.strength, self.hardness, erase)
-            for hit in stroke(app, last, event, _STEP * self.radius)
+            for hit in stroke(picker, last, event, _STEP * self.radius * app.surface(event.pane).framing.height)
         ]
 
     def ring(self, app: App, pane: int, hit: Hit) -> Curve:
@@ -59,20 +62,19 @@ class Brush:
         return Curve(rim, WHITE, 1.6, closed=True)
 
 
-def stroke(app: App, last: Pointer | None, event: Pointer, spacing: float) -> list[Hit]:
-    """Hits between two events of a drag, no farther apart than ``spacing`` in face heights, so that no gaps are left."""
+def stroke(picker: Picker, last: Pointer | None, event: Pointer, spacing: float) -> list[Hit]:
+    """Hits between two events of a drag, no farther apart than ``spacing``, in the face's unit."""
     if event.hit is None:
         return []
     if last is None or last.hit is None or last.pane != event.pane:
         return [event.hit]
-    height = app.surface(event.pane).framing.height
-    gap = float(np.linalg.norm(np.subtract(event.hit.position, last.hit.position))) / height
+    gap = float(np.linalg.norm(np.subtract(event.hit.position, last.hit.position)))
     count = int(np.clip(np.ceil(gap / max(spacing, 1e-9)), 1, _MOST_TOUCHES))
     hits = []
     start, end = np.asarray(last.direction), np.asarray(event.direction)
     for share in np.arange(1, count) / count:
         direction = (1 - share) * start + share * end
-        hit = app.picker(event.pane).along(event.origin, direction / np.linalg.norm(direction))
+        hit = picker.along(event.origin, direction / np.linalg.norm(direction))
         if hit is not None:
             hits.append(hit)
     return [*hits, event.hit]
