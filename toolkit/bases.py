@@ -26,6 +26,9 @@ _SHORT_LIST = 6
 _CHUNK_COLUMNS = 16384
 _EXACT = 1e-6
 """Share of the motion below which nothing is left out that could tremble."""
+_WEAKER = np.array([1.0, 0.25, 0.0625])
+_STEADY_COST = 1.05
+"""Steady weights may cost so much in RMS error, or all that the threshold leaves; else they are steadied less."""
 
 
 @dataclass(frozen=True)
@@ -132,10 +135,15 @@ def select_bases(
         errors += [errors[-1]] * (len(rest) - 1) + [0.0] * bool(len(rest))
     chosen = np.array(frames, dtype=np.int64)
     squared = _squared_errors(positions, chosen, weights)
-    if frames and errors[-1] > _EXACT * motion and parameters.steadiness > 0:
-        weights = steady_weights(gram[np.ix_(chosen, chosen)], gram[:, chosen], weights, parameters.steadiness)
-        squared = _squared_errors(positions, chosen, weights, exact=False)
-        errors[-1] = float(np.sqrt(squared.sum() * per_length))
+    if frames and errors[-1] > _EXACT * motion:
+        allowed = max(goal, _STEADY_COST * errors[-1])
+        for strength in parameters.steadiness * _WEAKER:
+            steady = steady_weights(gram[np.ix_(chosen, chosen)], gram[:, chosen], weights, float(strength))
+            left = _squared_errors(positions, chosen, steady, exact=False)
+            error = float(np.sqrt(left.sum() * per_length))
+            if error <= allowed:
+                weights, squared, errors[-1] = steady, left, error
+                break
     frame_errors = np.sqrt(squared / n_vertices)
     return BasisSelection(chosen, weights, np.array(errors), frame_errors)
 

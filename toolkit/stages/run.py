@@ -53,7 +53,7 @@ STAGES: dict[str, Stage] = {
             by_frames=True,
             reads=("source_vertices.npy", "source_triangles.npy"),
         ),
-        Stage("bases", ("inputs", "decompose"), ("bases",), bases.work, reads=("lines.json",)),
+        Stage("bases", ("inputs", "decompose"), ("bases",), bases.work, version=2, reads=("lines.json",)),
         Stage("transfer", ("register", "bases"), ("smoothing", "transfer", "details"), transfer.work),
         Stage("result", ("transfer",), ("smoothing", "details"), result.work, by_frames=True),
     )

@@ -1,0 +1,61 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+from toolkit.bases import BasisParameters, gram_matrix, select_bases
+from toolkit.steadying import steady_weights
+
+
+@pytest.fixture
+def take() -> tuple[np.ndarray, np.ndarray]:
+    """Frames (40, 90) on smooth curves, and bases (4, 90) that reach them only in part."""
+    rng = np.random.default_rng(3)
+    t = np.linspace(0, 1, 40)[:, None]
+    curves = np.maximum(np.sin(2 * np.pi * (t * [1, 1.5, 2, 3, 2.5] + [0, 0.2, 0.4, 0.6, 0.1])), 0) ** 2
+    frames = curves @ rng.normal(size=(5, 90))
+    return frames, frames[[5, 12, 20, 31]]
+
+
+def one_by_one(frames: np.ndarray, bases: np.ndarray) -> np.ndarray:
+    return np.stack([nnls(bases.T, frame)[0] for frame in frames])
+
+
+def test_the_weights_equal_a_direct_solve(take):
+    frames, bases = take
+    found = steady_weights(bases @ bases.T, frames @ bases.T, one_by_one(frames, bases), 2.0)
+    bend = np.sqrt(2.0) * np.diff(np.eye(len(frames)), n=2, axis=0)
+    matrix = np.concatenate([np.kron(np.eye(len(frames)), bases.T), np.kron(bend, bases.T)])
+    direct = nnls(matrix, np.concatenate([frames.ravel(), (bend @ frames).ravel()]))[0].reshape(found.shape)
+    assert found.min() >= 0
+    np.testing.assert_allclose(found, direct, atol=1e-4)
+
+
+def test_what_is_left_out_becomes_calmer_at_little_cost(take):
+    frames, bases = take
+    alone = one_by_one(frames, bases)
+    steady = steady_weights(bases @ bases.T, frames @ bases.T, alone, 1.0)
+    left = [frames - weights @ bases for weights in (alone, steady)]
+    unrest = [np.linalg.norm(np.diff(rest, n=4, axis=0)) for rest in left]
+    assert unrest[1] < 0.8 * unrest[0]
+    assert np.linalg.norm(left[1]) < 1.1 * np.linalg.norm(left[0])
+
+
+def test_a_take_that_the_bases_reach_keeps_its_weights():
+    rng = np.random.default_rng(0)
+    bases, weights = rng.normal(size=(3, 60)), np.abs(rng.normal(size=(20, 3)))
+    found = steady_weights(bases @ bases.T, (weights @ bases) @ bases.T, weights, 5.0)
+    np.testing.assert_allclose(found, weights, atol=1e-9)
+
+
+def test_the_errors_are_those_of_the_steadied_weights(take):
+    frames = take[0].reshape(40, 30, 3)
+    chosen = select_bases(gram_matrix(frames), 30, BasisParameters(threshold=0, count=3))
+    squared = ((np.einsum("tk,kvi->tvi", chosen.weights, frames[chosen.frames]) - frames) ** 2).sum(2).mean(1)
+    np.testing.assert_allclose(chosen.frame_errors**2, squared, rtol=1e-6, atol=1e-12)
+    assert chosen.errors[-1] == pytest.approx(np.sqrt(squared.mean()))
+    alone = select_bases(gram_matrix(frames), 30, BasisParameters(threshold=0, count=3, steadiness=0))
+    assert np.array_equal(chosen.frames, alone.frames)
+    assert np.array_equal(alone.weights[alone.frames], np.eye(3))
+    assert not np.array_equal(chosen.weights, alone.weights)
