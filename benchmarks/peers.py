@@ -2,8 +2,9 @@
 """What we do beside what others' libraries do, on the same machine and the same meshes, in one run.
 
 deformation_transfer: every frame by deformation transfer as published, scripted with SciPy, beside all of ours from
-decomposition to written frames. nricp_amberg, nricp_sumner: trimesh's registrations beside ours, with the same 30
-landmarks (ours also knows the performer's own rims of lips and lids, from 4,326 vertices on; trimesh takes no lines).
+decomposition to written frames. nricp_amberg, nricp_sumner: trimesh's registrations beside ours, from
+performers with so many vertices onto the target as it is, with the same 30 landmarks (ours also knows the performer's
+own rims of lips and lids, from 4,326 vertices on; trimesh takes no lines).
 filter_taubin: trimesh's filter, frame by frame. nnls: scipy.optimize.nnls, frame by frame (right from SciPy 1.16 on).
 
 Accuracy is how far each is off, less is better; "NOT AHEAD" marks what is not faster at equal or better accuracy. A

@@ -74,6 +74,8 @@ def run_limited(work: Callable[..., Any], arguments: tuple[Any, ...], limit: flo
         if not receiver.poll(limit + 60):
             return None, limit
         result, seconds = receiver.recv()
+    except EOFError:
+        raise RuntimeError(f"{work.__name__} failed on {arguments[:1]}; its process says above how") from None
     finally:
         process.kill()
         process.join()

@@ -23,6 +23,7 @@ from toolkit.registration import Landmarks, register
 from toolkit.registration.coarse import decimate
 from toolkit.registration.curves import loops_of, source_rims
 from toolkit.registration.interior import behind_loops
+from toolkit.registration.surface import Surface
 
 __all__ = ["compare_registration"]
 
@@ -49,7 +50,9 @@ class Pair:
 
 
 def compare_registration(name: str, n_vertices: int, peers: list[str], limit: float) -> list[Comparison]:
-    """Both of trimesh's methods at one resolution; a peer that takes longer than ``limit`` seconds is stopped.
+    """Both of trimesh's methods with ``n_vertices`` on the source; one that takes over ``limit`` seconds is stopped.
+
+    The target keeps its own triangles, as a scan would: 12,506 vertices, or those of the finest sample.
 
     The peers begin from the landmarks' similarity, which is not counted.
     """
@@ -89,7 +92,7 @@ def _trimesh(
 def _pair(name: str, n_vertices: int) -> Pair:
     performer = performer_at(max(n_vertices, LEVELS[0]))
     own = max(k for k, count in enumerate(LEVELS) if count <= max(n_vertices, LEVELS[0]))
-    level = next((k for k, count in enumerate(LEVELS) if count >= n_vertices), len(LEVELS) - 1)
+    level = 1 if n_vertices <= LEVELS[1] else 2
     truth_file = ensure_samples(level=own, targets=(name,)).targets[name].truth
     files = ensure_samples(level=level, targets=(name,)).targets[name]
     at_rest = Truth.load(truth_file, performer.paths.subdivision).shape(np.zeros(52))
@@ -97,17 +100,21 @@ def _pair(name: str, n_vertices: int) -> Pair:
     lines = [FeatureLine(line.name, line.closed, line.vertices) for line in lines]
     names = json.loads(Path(performer.paths.landmarks).read_text(encoding="utf-8"))
     judged = _skin(mesh, lines, names)
-    target = decimate(read_mesh(files.reference), n_vertices).mesh
+    target = read_mesh(files.reference)
     picks = np.array([pair["source"] for pair in json.loads(files.landmarks_30.read_text(encoding="utf-8"))["pairs"]])
     height = float(np.linalg.norm(truth[names["forehead_high"]] - truth[names["menton"]]))
     if n_vertices < mesh.n_vertices:
         fewer = decimate(mesh, n_vertices).mesh
-        tree = cKDTree(mesh.vertices)
-        near = tree.query(fewer.vertices)[1]
-        # On vertices of the performer, so that the truth is known; lines do not survive the decimation.
-        picks = cKDTree(mesh.vertices[near]).query(mesh.vertices[picks])[1]
-        mesh, truth, judged, lines = TriangleMesh(mesh.vertices[near], fewer.triangles), truth[near], judged[near], []
-    on_target = cKDTree(target.vertices).query(truth[picks])[1]
+        hits = Surface(mesh).closest(fewer.vertices)
+        corners = mesh.triangles[hits.triangles]
+        picks = cKDTree(fewer.vertices).query(mesh.vertices[picks])[1]
+        truth = np.einsum("nk,nkd->nd", hits.weights, truth[corners])
+        # Lines do not survive the decimation.
+        mesh, judged, lines = TriangleMesh(hits.points, fewer.triangles), np.all(judged[corners], axis=1), []
+    # Decimation may bring two picks to one vertex.
+    picks = np.unique(picks)
+    on_target, kept = np.unique(cKDTree(target.vertices).query(truth[picks])[1], return_index=True)
+    picks = picks[kept]
     marks = Landmarks.of(picks, on_target, [f"landmark {k}" for k in range(len(picks))])
     return Pair(mesh, target, truth, judged, marks, lines, height)
 

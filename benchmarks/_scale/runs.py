@@ -14,10 +14,20 @@ from typing import Any
 import numpy as np
 
 from benchmarks._scale.takes import PerformerAt
-from toolkit.feature_lines import save_feature_lines
+from toolkit.feature_lines import FeatureLine, save_feature_lines
+from toolkit.mesh import TriangleMesh
 from toolkit.meshio import write_mesh
 
-__all__ = ["ROOT", "Run", "read_write_floor", "run_measured", "substitution_floor", "warm_up", "write_shot"]
+__all__ = [
+    "ROOT",
+    "Run",
+    "read_write_floor",
+    "run_measured",
+    "substitution_floor",
+    "warm_up",
+    "write_inputs",
+    "write_shot",
+]
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -42,16 +52,20 @@ class Run:
         return asdict(self)
 
 
-def write_shot(folder: Path, performer: PerformerAt, n_frames: int, n_bases: int, options: str = "") -> None:
-    """A shot of the performer and a stretched copy as target, so that no registration is in the way."""
-    mesh = performer.mesh
+def write_shot(folder: Path, performer: PerformerAt, n_frames: int, n_bases: int) -> None:
+    """A shot of the performer onto a stretched copy of it."""
+    performer.write_take(folder / "take.npy", n_frames)
+    write_inputs(folder, performer.mesh, performer.lines(), n_bases)
+
+
+def write_inputs(folder: Path, mesh: TriangleMesh, lines: list[FeatureLine], n_bases: int) -> None:
+    """All of a shot but ``take.npy``; the target is the source stretched, so that no registration is in the way."""
     write_mesh(folder / "source.ply", mesh)
     write_mesh(folder / "target.ply", mesh.with_vertices(mesh.vertices * [1.12, 0.95, 1.05]))
-    save_feature_lines(folder / "feature_lines.json", performer.lines())
-    performer.write_take(folder / "take.npy", n_frames)
+    save_feature_lines(folder / "feature_lines.json", lines)
     (folder / "shot.toml").write_text(
         '[source]\nreference = "source.ply"\nframes = "take.npy"\nfps = 30\n[target]\nreference = "target.ply"\n'
-        f"[bases]\nthreshold = 1e-6\ncount = {n_bases}\n{options}",
+        f"[bases]\nthreshold = 1e-6\ncount = {n_bases}\n",
         encoding="utf-8",
     )
 
