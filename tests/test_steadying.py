@@ -49,6 +49,18 @@ def test_a_take_that_the_bases_reach_keeps_its_weights():
     np.testing.assert_allclose(found, weights, atol=1e-9)
 
 
+def test_frames_at_rest_stay_at_rest(take):
+    frames, bases = take[0].copy(), take[1]
+    frames[:4] = 0
+    alone = one_by_one(frames, bases)
+    held = np.arange(len(frames)) < 4
+    steady = steady_weights(bases @ bases.T, frames @ bases.T, alone, 1.0, held)
+    assert not steady[:4].any()
+    assert np.abs(steady - alone).max() > 1e-3
+    still = frames.reshape(40, 30, 3)
+    assert not select_bases(gram_matrix(still), 30, BasisParameters(threshold=0, count=3)).weights[:4].any()
+
+
 def test_the_errors_are_those_of_the_steadied_weights(take):
     frames = take[0].reshape(40, 30, 3)
     chosen = select_bases(gram_matrix(frames), 30, BasisParameters(threshold=0, count=3))

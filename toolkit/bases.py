@@ -26,6 +26,8 @@ _SHORT_LIST = 6
 _CHUNK_COLUMNS = 16384
 _EXACT = 1e-6
 """Share of the motion below which nothing is left out that could tremble."""
+_AT_REST = 1e-12
+"""Share of the largest frame's energy below which a frame is the rest pose."""
 _WEAKER = np.array([1.0, 0.25, 0.0625])
 _STEADY_COST = 1.05
 """Steady weights may cost so much in RMS error, or all that the threshold leaves; else they are steadied less."""
@@ -112,7 +114,7 @@ def select_bases(
     if parameters.threshold_length is not None:
         goal = max(goal, parameters.threshold_length) if parameters.threshold else parameters.threshold_length
     limit = min(parameters.count or len(gram), len(gram))
-    alive = energy > 1e-12 * max(float(energy.max(initial=0)), 1e-300)
+    alive = energy > _AT_REST * max(float(energy.max(initial=0)), 1e-300)
     frames: list[int] = []
     weights = np.zeros((len(gram), 0))
     errors = [motion]
@@ -137,8 +139,9 @@ def select_bases(
     squared = _squared_errors(positions, chosen, weights)
     if frames and errors[-1] > _EXACT * motion:
         allowed = max(goal, _STEADY_COST * errors[-1])
+        inner, at_rest = gram[np.ix_(chosen, chosen)], energy <= _AT_REST * energy.max()
         for strength in parameters.steadiness * _WEAKER:
-            steady = steady_weights(gram[np.ix_(chosen, chosen)], gram[:, chosen], weights, float(strength))
+            steady = steady_weights(inner, gram[:, chosen], weights, float(strength), at_rest)
             left = _squared_errors(positions, chosen, steady, exact=False)
             error = float(np.sqrt(left.sum() * per_length))
             if error <= allowed:

@@ -22,10 +22,13 @@ _MOST_STEPS = 2000
 _TOLERANCE = 1e-7
 
 
-def steady_weights(inner: Array, coupling: Array, start: Array, strength: float) -> Array:
+def steady_weights(
+    inner: Array, coupling: Array, start: Array, strength: float, held: NDArray[np.bool_] | None = None
+) -> Array:
     """Minimise the above from ``start`` (T, K), the weights fitted frame by frame; ``(T, K)``, non-negative.
 
-    ``inner`` (K, K) = B B^T, ``coupling`` (T, K) = X B^T, frames in their order in time; ``strength`` s, in frames^4.
+    ``inner`` (K, K) = B B^T, ``coupling`` (T, K) = X B^T, frames in their order in time; ``strength`` s, in frames^4;
+    frames that are ``held`` (T,) keep the weights they have: at rest, all must stay at rest.
     Nesterov's projected gradient steps, restarted where they would climb (O'Donoghue and Candes 2015).
     """
     if strength == 0 or len(start) < 3 or start.shape[1] == 0:
@@ -40,6 +43,8 @@ def steady_weights(inner: Array, coupling: Array, start: Array, strength: float)
     enough = _TOLERANCE * max(float(weights.max()), 1e-300)
     for _ in range(_MOST_STEPS):
         gradient = _coupled(ahead @ scaled - right, strength)
+        if held is not None:
+            gradient[held] = 0
         moved = np.maximum(ahead - step * gradient, 0)
         change = moved - weights
         if np.abs(change).max() < enough:
