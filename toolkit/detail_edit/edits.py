@@ -95,8 +95,8 @@ class PasteEdit(KeyedEdit):
 class ReshapeEdit(KeyedEdit):
     """Bend the region so that its wrinkle, which runs along ``curve``, runs along ``goal`` (Eq. 17).
 
-    Points correspond by arc length, first to first; the wrinkle is removed where it was. ``stiffness`` is the weight of
-    the Laplacian term.
+    Points correspond by arc length, in whichever direction takes the ends less far; the wrinkle is removed where it
+    was. ``stiffness`` is the weight of the term that keeps the region in shape.
     """
 
     curve: Curve

@@ -18,7 +18,7 @@ from toolkit.detail_edit.surface import Surface
 from toolkit.mesh.geometry import face_normals
 from toolkit.solve import factorise
 
-__all__ = ["FlatPatch", "flattened", "located", "minimal_turn"]
+__all__ = ["FlatPatch", "flattened", "gradients", "located", "minimal_turn"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -65,7 +65,7 @@ def flattened(surface: Surface, vertices: Ids, centre: Ids, weights: Array, axes
     faces = local.reshape(-1, 3)
     points = surface.vertices[ids]
     sides, areas = _unfolded(points, faces)
-    along, across = _gradients(sides, areas, faces, len(ids))
+    along, across = gradients(sides, areas, faces, len(ids))
     weighted = sp.diags(areas)
     stiffness = sp.csc_matrix(along.T @ weighted @ along + across.T @ weighted @ across)
     middle = np.searchsorted(ids, centre)
@@ -157,8 +157,11 @@ def _unfolded(points: Array, faces: Ids) -> tuple[Complex, Array]:
     return np.stack([length + 0j, along + 1j * double / length], axis=1), double / 2
 
 
-def _gradients(sides: Complex, areas: Array, faces: Ids, n: int) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """Derivatives ``(f, n)`` along and across the first side of each triangle of a function on the vertices."""
+def gradients(sides: Complex, areas: Array, faces: Ids, n: int) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Derivatives ``(f, n)`` of a function on the vertices, along the real and the imaginary axis of each triangle.
+
+    ``sides`` (f, 2) complex, its first and second side from the first corner; ``areas`` (f,).
+    """
     opposite = np.stack([sides[:, 1] - sides[:, 0], -sides[:, 1], sides[:, 0]], axis=1)  # of corners 0, 1, 2
     slopes = 1j * opposite / (2 * areas[:, None])
     rows = np.repeat(np.arange(len(faces)), 3)

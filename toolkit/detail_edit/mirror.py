@@ -60,8 +60,10 @@ class Mirror:
         candidates = np.flatnonzero(near <= 3 * surface.edge(region.vertices))
         _, triangles, inside = self._ground.closest(self._warped(surface.vertices[candidates]))
         weights = np.einsum("nk,nk->n", inside, field[surface.triangles[triangles]])
-        ids = candidates[weights > 1e-3]
-        return Region(ids, np.clip(weights[weights > 1e-3], 0, 1))
+        if (region.weights == 1).all():  # a hard border stays hard
+            weights = np.round(weights)
+        kept = weights > 1e-3
+        return Region(candidates[kept], np.clip(weights[kept], 0, 1))
 
     def _warped(self, points: Array) -> Array:
         """Where points ``(n, 3)`` come to lie on the other side, before they are put on the surface."""

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from toolkit.detail_edit.bend import bent_along
 from toolkit.detail_edit.carry import Carrier, carrier
 from toolkit.detail_edit.edits import PasteEdit, ReshapeEdit
-from toolkit.detail_edit.flatten import FlatPatch, flattened, located, minimal_turn
+from toolkit.detail_edit.flatten import FlatPatch, flattened, minimal_turn
 from toolkit.detail_edit.mirror import Mirror
 from toolkit.detail_edit.region import Region
 from toolkit.detail_edit.surface import Surface, SurfacePoint
 from toolkit.detail_edit.take import DetailTake
 from toolkit.errors import InputError
-from toolkit.mesh.topology import unique_edges
-from toolkit.solve import factorise
 
 __all__ = ["paste_carrier", "reshape_carrier"]
 
@@ -56,8 +54,7 @@ def paste_carrier(edit: PasteEdit, region: Region, take: DetailTake, source: Det
 def reshape_carrier(edit: ReshapeEdit, region: Region, take: DetailTake) -> Carrier:
     """The map of a reshaped wrinkle; ``region`` is the edit's with its band.
 
-    ``argmin_u sum_c |C u - goal_c|^2 + stiffness |L (u - u_0)|^2`` in the plane: points c of the curve, goals by the
-    same share of the arc length, L the mean-of-neighbours Laplacian.
+    Both lie on one patch of the skin, laid flat; there the region is bent (`bent_along`).
     """
     surface = take.surface
     surface.check_triangles(np.concatenate([edit.curve.triangles, edit.goal.triangles]))
@@ -69,9 +66,7 @@ def reshape_carrier(edit: ReshapeEdit, region: Region, take: DetailTake) -> Carr
         )
     if abs(start[0] - end[0]) + abs(start[-1] - end[-1]) > abs(start[0] - end[-1]) + abs(start[-1] - end[0]):
         end = end[::-1]  # a wrinkle has no direction, and people draw from either side
-    edges = np.abs(flat.places[flat.triangles[:, 0]] - flat.places[flat.triangles[:, 1]])
-    count = max(int(np.ceil(2 * _length(start) / float(np.median(edges)))), 2)
-    bent = flat.places + _bend(flat, _along(start, count), _along(end, count), edit.stiffness)
+    bent = bent_along(flat, region, start, end, edit.stiffness)
     return carrier(flat, bent, region, flat, (take.neighbour, take.neighbour), 1.0)
 
 
@@ -135,35 +130,6 @@ def _reshape_patch(edit: ReshapeEdit, region: Region, take: DetailTake) -> FlatP
     if flat is None:
         raise InputError("there is no skin round the wrinkle's curve")
     return flat
-
-
-def _bend(flat: FlatPatch, start: Complex, goal: Complex, stiffness: float) -> Complex:
-    """Displacement ``(n,)`` of a patch that takes points ``start`` (k,) to ``goal`` (k,)."""
-    triangle, weights = located(flat.places, flat.triangles, start)
-    seen = triangle >= 0
-    corners, weights = flat.triangles[triangle[seen]], weights[seen]
-    n = len(flat.vertices)
-    rows = np.repeat(np.arange(len(corners)), 3)
-    at_curve = sp.csr_matrix((weights.ravel(), (rows, corners.ravel())), shape=(len(corners), n))
-    i, j = unique_edges(flat.triangles).T
-    adjacency = sp.csr_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=(n, n))
-    mean = sp.diags(1 / np.maximum(np.asarray(adjacency.sum(axis=1)).ravel(), 1)) @ adjacency
-    laplacian = sp.identity(n) - mean
-    matrix = at_curve.T @ at_curve + stiffness * (laplacian.T @ laplacian)
-    right = at_curve.T @ (goal - start)[seen]
-    solved = factorise(sp.csc_matrix(matrix)).solve(np.stack([right.real, right.imag], axis=1))
-    return np.asarray(solved[:, 0] + 1j * solved[:, 1])
-
-
-def _along(line: Complex, count: int) -> Complex:
-    """Points ``(count,)`` evenly spread by arc length along a polyline."""
-    at = np.concatenate([[0], np.cumsum(np.abs(np.diff(line)))])
-    asked = np.linspace(0, at[-1], count)
-    return np.asarray(np.interp(asked, at, line.real) + 1j * np.interp(asked, at, line.imag))
-
-
-def _length(line: Complex) -> float:
-    return float(np.abs(np.diff(line)).sum())
 
 
 def _unit(take: DetailTake) -> float:
