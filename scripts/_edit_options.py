@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["add_pose_options", "add_wrinkle_options", "edit_of_file", "frames_range", "pose_of", "wrinkle_of"]
 
-_NUMBERS = ("lambda_b", "lambda_w", "lambda_e", "handle", "smoothness", "tolerance")
+_NUMBERS = ("lambda_b", "lambda_w", "lambda_e", "handle", "reach", "smoothness", "tolerance")
 
 
 class _AtFrame(argparse.Action):
@@ -259,9 +259,10 @@ def _gains(text: str) -> tuple[tuple[int, float], ...]:
 
 _HELP = {
     "lambda_b": "weight of the change of the bases (1)",
-    "lambda_w": "weight of the change of the curves' motion (1)",
-    "lambda_e": "weight of what is asked (1000)",
+    "lambda_w": "weight of the change of the curves' motion (10)",
+    "lambda_e": "weight of what is asked (10000)",
     "handle": "radius of the disc that a pull takes hold of, as a share of the face's diagonal (0.015)",
+    "reach": "how far a pull carries over the surface, as a share of the same (0.1); 0 is no limit",
     "smoothness": "frames below which the curves prefer to bend slowly (5)",
     "tolerance": "the rounds end when one gains less than this share (0.05)",
 }

@@ -44,7 +44,7 @@ class Joint:
         self.n = last - self.first + 1
         problem = PoseEditor(take, mesh.triangles)._problem(self.rows, parameters, (self.first, last))
         self.time, self.lambda_b, self.lambda_e = problem.weights.time, parameters.lambda_b, problem.lambda_e
-        self.matrix = take.system.matrix.toarray()
+        self.matrix = PoseEditor(take, mesh.triangles).matrix(parameters).toarray()
         self.picks = np.zeros((len(self.rows), take.n_vertices))
         self.picks[:, self.rows.vertices] = self.rows.combination
         # The Cholesky factor makes the bases' term a sum of squares: SciPy then needs far fewer steps.
@@ -94,7 +94,7 @@ def test_reaches_the_energy_of_a_joint_bounded_solve(patch: tuple[TriangleMesh, 
         PointConstraint(7, 30, offset=(0.0, -0.2, 0.1), weight=2.0),
         DistanceConstraint(4, (9, 24), factor=1.4),
     ]
-    parameters = EditParameters(window=(2, 9), lambda_w=lambda_w, lambda_e=30.0, handle=0)
+    parameters = EditParameters(window=(2, 9), lambda_w=lambda_w, lambda_e=30.0, handle=0, tolerance=0.01)
     joint = Joint(mesh, take, constraints, parameters)
     edit = PoseEditor(take, mesh.triangles).solve(constraints, parameters)
     assert np.abs(edit.weights - take.weights).max() > 1e-3
@@ -115,8 +115,10 @@ def test_plain_alternation_stops_farther_from_it(patch: tuple[TriangleMesh, Edit
     assert known.energies[-1] < 0.9 * plain.energies[-1]
 
 
-@pytest.mark.parametrize("held", [False, True])
-def test_the_bases_step_solves_the_full_normal_equations(patch: tuple[TriangleMesh, EditableTake], held: bool) -> None:
+@pytest.mark.parametrize(("held", "reach"), [(False, 0.0), (True, 0.0), (False, 0.2), (True, 0.2)])
+def test_the_bases_step_solves_the_full_normal_equations(
+    patch: tuple[TriangleMesh, EditableTake], held: bool, reach: float
+) -> None:
     mesh, take = patch
     constraints: list = [
         PointConstraint(4, 9, offset=(0.1, -0.05, -0.2)),
@@ -127,7 +129,7 @@ def test_the_bases_step_solves_the_full_normal_equations(patch: tuple[TriangleMe
     fixed = np.array([0, 1, 2, 40, 41] if held else [], dtype=int)
     if held:
         constraints.append(FixedConstraint(tuple(fixed.tolist())))
-    parameters = EditParameters(mode="bases", lambda_b=2.0, handle=0)
+    parameters = EditParameters(mode="bases", lambda_b=2.0, handle=0, reach=reach)
     joint = Joint(mesh, take, constraints, parameters)
     free = np.setdiff1d(np.arange(take.n_vertices), fixed)
     full = joint.lambda_b * np.kron(np.eye(take.n_bases), joint.matrix[np.ix_(free, free)])
@@ -276,7 +278,7 @@ def test_a_handle_takes_the_spike_off(bump: TriangleMesh, face: EditableTake) ->
     near = PointConstraint(KEY, int(ring[0]), offset=(0.0, 0.0, 0.1))
     follows = []
     for handle in (0.0, 0.08):
-        parameters = EditParameters(mode="bases", handle=handle)
+        parameters = EditParameters(mode="bases", handle=handle, reach=0)
         editor = PoseEditor(face, bump.triangles)
         edit = editor.solve([pull], parameters)
         assert edit.residuals[0].left < 0.01 * edit.residuals[0].asked
@@ -284,13 +286,27 @@ def test_a_handle_takes_the_spike_off(bump: TriangleMesh, face: EditableTake) ->
         follows.append(moved[ring, 2].min() / moved[v, 2])
         # The energy told is that of the edited bases, whatever they were sought among.
         delta = edit.moves.of_bases()
-        bent = sum(float(np.sum(d * (face.system.matrix @ d))) for d in delta)
+        bent = sum(float(np.sum(d * (editor.matrix(parameters) @ d))) for d in delta)
         left = parameters.lambda_e / editor._edge**2 * edit.residuals[0].left ** 2
         assert edit.energies[-1] == pytest.approx(bent + left, rel=1e-6)
         both = editor.solve([pull, near], parameters)
         assert max(residual.left for residual in both.residuals) < 0.01 * 0.1
     assert follows[1] > 0.9 > follows[0]
     assert 1 - follows[1] < 0.5 * (1 - follows[0])
+
+
+def test_a_reach_keeps_a_pull_from_taking_the_whole_face_along(bump: TriangleMesh, face: EditableTake) -> None:
+    pull = PointConstraint(KEY, vertex_near(face, 0.6, 0.6), offset=(0.0, 0.0, 0.1))
+    away = np.sqrt(((face.rest - face.rest[pull.vertex]) ** 2).sum(axis=1))
+    far = []
+    for reach in (0.0, 0.1, 0.05):
+        edit = PoseEditor(face, bump.triangles).solve([pull], EditParameters(mode="bases", reach=reach))
+        moved = motion(edit.take, face, KEY)
+        assert moved[pull.vertex] == pytest.approx(0.1, rel=0.01)
+        far.append(float(np.median(moved[away > 1.2])))
+    assert far[0] > 0.02
+    assert far[1] < 0.1 * far[0]
+    assert far[2] < 0.1 * far[1]
 
 
 def test_contradictions_are_told_by_their_residuals(bump: TriangleMesh, face: EditableTake) -> None:

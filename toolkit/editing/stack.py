@@ -102,6 +102,7 @@ class EditStack:
         self._offsets = offsets
         self.base = self._seen(State(opened, opened.take))
         self._editor = PoseEditor(self.base.take, triangles)
+        self._editor.prepare(EditParameters())
         self._layers: OrderedDict[tuple[str, ...], Layer] = OrderedDict()
         # Details live in local frames: what an edit of theirs does depends on no pose.
         self._changes: OrderedDict[tuple[str, ...], DetailChange] = OrderedDict()

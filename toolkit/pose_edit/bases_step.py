@@ -13,11 +13,17 @@ once, and a dense system as small as the constraints are few.
 vertices the first ring follows by 84 %. With a handle's radius the pull acts on a small disc instead: the answer is
 sought among the responses ``A^-1 f`` to pulls ``f`` on such discs, still meets the goal at the vertex itself, and is
 smooth there (97 % with a disc of three edges). Radius 0 is the paper's.
+
+``A`` knows gradients only, and is held by what the take never moves: a pull at an eyelid moves the far side of the face
+by 40 % of it. With a reach ``l``, ``A`` becomes ``A + D / l^2``, ``D`` a third of the number of triangles at each
+vertex (``A`` counts triangles alike, too): displacements themselves cost, and the answer fades as
+``exp(-distance / l)``. That needs a factor of its own, made once. Reach 0 is the paper's, on the transfer's factor.
 """
 
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from toolkit.pose_edit.handles import Handles
@@ -36,17 +42,21 @@ class Responses:
     """``Z = A^-1 F``: how the whole face follows pulls at some vertices; columns are kept for the next solve.
 
     ``held`` vertices do not follow: their rows and columns are struck from ``A``, which is factorised anew, once for
-    each set of held vertices. The system is smaller then, so every substitution is quicker.
+    each set of held vertices. The system is smaller then, so every substitution is quicker. ``screening`` (V,) is what
+    the reach adds to the diagonal of ``A``, None nothing.
     """
 
-    def __init__(self, system: TransferSystem, held: Ids, handles: Handles) -> None:
+    def __init__(self, system: TransferSystem, held: Ids, handles: Handles, screening: Array | None = None) -> None:
         self.held, self.handles = held, handles
         n_vertices = system.matrix.shape[0]
         self._n_vertices = n_vertices
         self._free = np.setdiff1d(np.arange(n_vertices), held)
-        self._factor: Factor = system.factor
-        if len(held) and len(self._free):
-            self._factor = factorise(system.matrix[self._free][:, self._free])
+        self._factor: Factor
+        if screening is None and not len(held):
+            self._factor = system.factor
+        elif len(self._free):
+            matrix = system.matrix if screening is None else system.matrix + sp.diags(screening)
+            self._factor = factorise(matrix.tocsr()[self._free][:, self._free] if len(held) else matrix)
         self._columns: dict[int, Array] = {}
         self._last: tuple[Ids, Array] = (np.zeros(0, dtype=np.int64), np.zeros((n_vertices, 0)))
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from toolkit.errors import InputError
 
 __all__ = ["EditParameters"]
@@ -21,10 +23,16 @@ class EditParameters:
 
     ``lambda_b``, ``lambda_w``, ``lambda_e`` weigh the change of the bases, of the weights' motion, and the
     constraints. Only their ratios count, and they mean the same at any size, unit and window: constraints are measured
-    in units of the median edge, weights by how far the bases move the face and by the window's length.
+    in units of the median edge, weights by how far the bases move the face and by the window's length. In the mode
+    "weights" a tenth of ``lambda_e`` counts: nothing else gives way there, and expressions that hardly have the asked
+    motion in them would be exaggerated beyond measure.
 
     ``handle`` is the radius of the disc that a pull takes hold of, as a share of the rest shape's diagonal; 0, the
     paper's, leaves a spike at every constrained vertex (`toolkit.pose_edit.bases_step`).
+
+    ``reach`` is how far a pull on the bases carries over the surface, as a share of the same diagonal; beyond it fades.
+    Without it (0, the paper's) only what the take never moves holds the face, and one brow takes the whole face along
+    (`toolkit.pose_edit.bases_step`).
 
     ``smoothness`` is the time in frames below which weights prefer to bend slowly; 0 is the paper's velocity term
     alone. ``coupled`` lets the weights step know that the bases will follow; False is the paper's plain alternation,
@@ -34,9 +42,10 @@ class EditParameters:
     mode: str = "both"
     window: tuple[int, int] | None = None
     lambda_b: float = 1.0
-    lambda_w: float = 1.0
-    lambda_e: float = 1000.0
+    lambda_w: float = 10.0
+    lambda_e: float = 10000.0
     handle: float = 0.015
+    reach: float = 0.1
     smoothness: float = 5.0
     coupled: bool = True
     tolerance: float = 0.05
@@ -54,6 +63,10 @@ class EditParameters:
         if not 0 <= self.handle < 1:
             raise InputError(
                 f"a handle of {self.handle} times the face makes no sense", remedy="give a share like 0.015, or 0"
+            )
+        if not 0 <= self.reach < np.inf:
+            raise InputError(
+                f"a reach of {self.reach} makes no sense", remedy="give a share like 0.1, or 0 for no limit"
             )
         if not (self.smoothness >= 0 and self.tolerance >= 0 and self.most_rounds >= 1):
             raise InputError(

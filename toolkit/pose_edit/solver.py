@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from toolkit.errors import InputError
@@ -60,7 +61,9 @@ class PoseEditor:
         self._graph = edge_lengths(take.rest, unique_edges(triangles))
         self._edge = float(np.median(self._graph.data))
         self._reach = _reach(take)
-        self._responses: OrderedDict[tuple[float, bytes], Responses] = OrderedDict()
+        self._n_triangles = np.bincount(np.asarray(triangles).ravel(), minlength=take.n_vertices)
+        self._diagonal = float(np.sqrt(np.sum(np.ptp(take.rest, axis=0) ** 2)))
+        self._responses: OrderedDict[tuple[float, float, bytes], Responses] = OrderedDict()
         self._gram: tuple[NDArray[np.int64], Array] | None = None
         self._last: tuple[EditParameters, Array] | None = None
 
@@ -123,9 +126,11 @@ class PoseEditor:
                 f"frame {rows.frames[~inside][0]} is edited but lies outside the window from {first} to {last}",
                 remedy='widen the window, or let the bases change too (mode "both")',
             )
-        responses = self._respond(rows, parameters.handle) if parameters.mode != "weights" else None
+        responses = None
+        if parameters.mode != "weights":
+            responses = self._responses_of(rows.held, parameters)(rows.vertices)
         # Constraints in units of the median edge; weights in units of what they move, evened out over the window.
-        lambda_e = parameters.lambda_e / self._edge**2
+        lambda_e = parameters.lambda_e / self._edge**2 * (0.1 if parameters.mode == "weights" else 1.0)
         lambda_w = parameters.lambda_w * (self._reach / self._edge) ** 2 * n / 4
         time = lambda_w * time_matrix(n, first > 0, last < take.n_frames - 1, parameters.smoothness)
         gram = None if not len(rows.held) else lambda_e * rows.held_weight * self._held_gram(rows.held)
@@ -146,16 +151,30 @@ class PoseEditor:
             lambda_e=lambda_e,
         )
 
-    def _respond(self, rows: ConstraintRows, handle: float) -> Array:
-        """``Z`` (V, U) for the rows' vertices."""
-        radius = handle * float(np.sqrt(np.sum(np.ptp(self.take.rest, axis=0) ** 2)))
-        key = (radius, rows.held.tobytes())
+    def prepare(self, parameters: EditParameters) -> None:
+        """Make the factor that solves with these parameters need, so that the first of them does not wait for it."""
+        self._responses_of(np.zeros(0, dtype=np.int64), parameters)
+
+    def _responses_of(self, held: NDArray[np.int64], parameters: EditParameters) -> Responses:
+        key = (parameters.handle, parameters.reach, held.tobytes())
         if key not in self._responses:
-            self._responses[key] = Responses(self.take.system, rows.held, Handles(self._graph, radius))
+            handles = Handles(self._graph, parameters.handle * self._diagonal)
+            self._responses[key] = Responses(self.take.system, held, handles, self._screening(parameters))
         self._responses.move_to_end(key)
         while len(self._responses) > _MOST_FACTORS:
             self._responses.popitem(last=False)
-        return self._responses[key](rows.vertices)
+        return self._responses[key]
+
+    def _screening(self, parameters: EditParameters) -> Array | None:
+        if parameters.reach == 0:
+            return None
+        return np.asarray(self._n_triangles / (3 * (parameters.reach * self._diagonal) ** 2))
+
+    def matrix(self, parameters: EditParameters) -> sp.csc_matrix:
+        """What a change of a basis costs, ``delta^T matrix delta``: the transfer's own matrix, and the reach's part."""
+        screening = self._screening(parameters)
+        matrix = self.take.system.matrix
+        return matrix if screening is None else sp.csc_matrix(matrix + sp.diags(screening))
 
     def _held_gram(self, held: NDArray[np.int64]) -> Array:
         """Inner products of the bases' displacements over the held vertices, ``(K, K)``."""
