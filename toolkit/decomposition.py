@@ -15,6 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from toolkit.blocks import scratch
 from toolkit.kernels import block_to_frames, frames_to_block, take_details
 from toolkit.mesh.core import TriangleMesh
 from toolkit.mesh.geometry import local_frames, vertex_normals
@@ -98,10 +99,10 @@ class Decomposer:
             delta,
         )
         smooth = self.filter.smooth_block(delta)
-        points = smooth + self._smooth32[:, :, None]
-        delta -= smooth
-        delta += self._offset32[:, :, None]  # now S_t - S~_t
-        take_details(points, self.block.triangles, self.block.neighbour, np.empty_like(points), delta, self._detail32)
+        points = np.add(smooth, self._smooth32[:, :, None], out=scratch("points", smooth))
+        block, normals = self.block, scratch("normals", points)
+        own, local = self._offset32, self._detail32
+        take_details(points, block.triangles, block.neighbour, normals, smooth, own, local, delta)
         return smooth, delta
 
 

@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from toolkit.blocks import scratch
 from toolkit.coating_details import CoatingDetails
 from toolkit.decomposition import Decomposer
 from toolkit.errors import InputError
@@ -191,14 +192,13 @@ class Reconstruction:
         self, points: NDArray[np.float32], details: NDArray[np.float32], start: int, stop: int
     ) -> NDArray[np.float32]:
         """What details add to the large-scale ``points``, edits included, ``(V, 3, B)``."""
-        scratch = np.empty_like(points)
-        shift = self._rotated(points, details, self._gain, self._own, scratch)
+        shift = self._rotated(points, details, self._gain, self._own)
         if self._coating is not None:
             shift = self._coating.displacement(points, shift, start, stop)
         change = self._change(details, start, stop)
         if change is not None:
             # A displacement of its own, so that what it leaves alone stays bit for bit; as a coating it would leak.
-            shift += self._rotated(points, change, np.ones_like(self._gain), self._own_change, scratch)
+            shift += self._rotated(points, change, np.ones_like(self._gain), self._own_change)
         return shift
 
     def _change(self, details: NDArray[np.float32], start: int, stop: int) -> NDArray[np.float32] | None:
@@ -218,12 +218,11 @@ class Reconstruction:
         details: NDArray[np.float32],
         gain: NDArray[np.float32],
         own: NDArray[np.float32],
-        scratch: NDArray[np.float32],
     ) -> NDArray[np.float32]:
         """``G_t (own + gain details)`` as displacements, ``(V, 3, B)``."""
         shift = np.empty_like(points)
-        block = self._target.block
-        rotate_details(points, block.triangles, block.neighbour, scratch, details, self._order, gain, own, shift)
+        block, normals = self._target.block, scratch("normals", points)
+        rotate_details(points, block.triangles, block.neighbour, normals, details, self._order, gain, own, shift)
         return shift
 
     def _ordered(self, change: BasesChange) -> NDArray[np.float32]:

@@ -16,7 +16,9 @@ __all__ = [
     "block_frames",
     "block_to_frames",
     "chebyshev_of_average",
+    "edge_frames",
     "frames_to_block",
+    "keep_largest_change",
     "place_frames",
     "rotate_details",
     "take_details",
@@ -132,17 +134,23 @@ def _average_rows(starts, neighbours, share, first, last, current, coefficient, 
 
 
 @njit(**_OPTIONS)
-def chebyshev_of_average(starts, neighbours, share, coefficients, bandwidth, depth, block):
-    """``sum_k c_k T_k(-W) block`` (V, C), ``W`` the mean over each vertex's neighbours, by Clenshaw's recurrence.
+def chebyshev_of_average(starts, neighbours, share, coefficients, bandwidth, depth, block, out, spare):
+    """``out <- sum_k c_k T_k(-W) block`` (V, C) by Clenshaw's recurrence, ``W`` the mean over each vertex's neighbours.
 
     ``neighbours[starts[i]:starts[i + 1]]`` are row i's, none further than ``bandwidth`` rows away; ``share`` (V,) one
-    over their number. ``b_k = c_k block - 2 W b_(k+1) - b_(k+2)``; two buffers do, as a row of ``b_(k+2)`` is last
-    needed where ``b_k`` takes its place. ``depth`` steps go over the rows together, each a chunk of ``bandwidth`` rows
-    behind the step before it, so that a chunk is in the cache for all of them: memory is the bottleneck.
+    over their number. ``b_k = c_k block - 2 W b_(k+1) - b_(k+2)``; ``out`` and ``spare`` do for all of them, as a row
+    of ``b_(k+2)`` is last needed where ``b_k`` takes its place. ``depth`` steps go over the rows together, each a chunk
+    of ``bandwidth`` rows behind the step before it, so that a chunk is in the cache for all of them: memory is the
+    bottleneck.
     """
     n_rows = len(block)
     degree = len(coefficients) - 1
-    current, previous = coefficients[degree] * block, np.zeros_like(block)
+    # Chosen so that the last step writes to ``out``.
+    current, previous = (out, spare) if degree % 2 == 0 else (spare, out)
+    for i in range(n_rows):
+        for c in range(block.shape[1]):
+            current[i, c] = coefficients[degree] * block[i, c]
+            previous[i, c] = 0
     total = np.empty(block.shape[1], block.dtype)
     double = share + share
     n_chunks = (n_rows + bandwidth - 1) // bandwidth
@@ -159,7 +167,6 @@ def chebyshev_of_average(starts, neighbours, share, coefficients, bandwidth, dep
                 weight = share if k == 0 else double
                 _average_rows(starts, neighbours, weight, first, last, read, coefficients[k], block, total, write)
         done += steps
-    return current if degree % 2 == 0 else previous
 
 
 @njit(**_OPTIONS)
@@ -243,10 +250,12 @@ def _dot(a, b, out):
 
 
 @njit(**_OPTIONS)
-def take_details(points, triangles, neighbour, normals, displacement, rest_detail):
-    """Turn displacements into motion details, in place: ``d = F^T displacement - e_0`` (method 3, Eq. 3).
+def take_details(points, triangles, neighbour, normals, smooth, rest_offset, rest_detail, delta):
+    """Turn deltas into motion details, in place: ``d = F^T (delta - smooth + rest_offset) - e_0`` (method 3, Eq. 3).
 
-    ``points`` and ``displacement`` (V, 3, B), ``normals`` scratch of the same shape, ``rest_detail`` (V, 3).
+    ``points`` (V, 3, B) are smoothed, ``smooth`` and ``delta`` (V, 3, B) the smoothed and the full change since rest,
+    ``rest_offset`` and ``rest_detail`` (V, 3) the rest shape's detail, plain and in its local frames; ``normals``
+    (V, 3, B) is scratch.
     """
     _accumulate_normals(points, triangles, normals)
     n_vertices, _, n_frames = points.shape
@@ -261,8 +270,9 @@ def take_details(points, triangles, neighbour, normals, displacement, rest_detai
         for v in range(first, last):
             i = v - first
             for k in range(3):
+                offset = rest_offset[v, k]
                 for t in range(n_frames):
-                    x[k, i, t] = displacement[v, k, t]
+                    x[k, i, t] = delta[v, k, t] - smooth[v, k, t] + offset
         _dot(tangent.reshape(3, n), flat_x, flat_along[0])
         _dot(bitangent.reshape(3, n), flat_x, flat_along[1])
         _dot(normal.reshape(3, n), flat_x, flat_along[2])
@@ -271,7 +281,7 @@ def take_details(points, triangles, neighbour, normals, displacement, rest_detai
             for k in range(3):
                 own = rest_detail[v, k]
                 for t in range(n_frames):
-                    displacement[v, k, t] = along[k, i, t] - own
+                    delta[v, k, t] = along[k, i, t] - own
 
 
 @njit(**_OPTIONS)
@@ -321,3 +331,41 @@ def block_frames(points, triangles, neighbour):
                     frames[v, k, 0, t], frames[v, k, 1, t] = tangent[k, i, t], bitangent[k, i, t]
                     frames[v, k, 2, t] = normal[k, i, t]
     return frames
+
+
+@njit(**_OPTIONS)
+def edge_frames(vertices, triangles, out):
+    """``[e0 e1 n]`` of every triangle, as columns, ``out`` (F, 3, 3); ``n = e0 x e1 / sqrt(|e0 x e1|)``."""
+    for f in range(len(triangles)):
+        _edge_frame(vertices, triangles, f, out[f])
+
+
+@njit(**_OPTIONS)
+def _edge_frame(vertices, triangles, f, out):
+    a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
+    for k in range(3):
+        out[k, 0], out[k, 1] = vertices[b, k] - vertices[a, k], vertices[c, k] - vertices[a, k]
+    squared = 0.0
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        out[k, 2] = out[i, 0] * out[j, 1] - out[j, 0] * out[i, 1]
+        squared += out[k, 2] ** 2
+    root = np.sqrt(max(np.sqrt(squared), 1e-300))
+    for k in range(3):
+        out[k, 2] /= root
+
+
+@njit(**_OPTIONS)
+def keep_largest_change(vertices, triangles, inverse, largest):
+    """``largest <- max(largest, |[e0 e1 n] inverse - I|^2)`` (F,), Frobenius norm; ``inverse`` (F, 3, 3)."""
+    frame = np.empty((3, 3))
+    for f in range(len(triangles)):
+        _edge_frame(vertices, triangles, f, frame)
+        total = 0.0
+        for i in range(3):
+            for j in range(3):
+                change = -1.0 if i == j else 0.0
+                for k in range(3):
+                    change += frame[i, k] * inverse[f, k, j]
+                total += change**2
+        largest[f] = max(largest[f], total)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.fft import dct
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from toolkit.blocks import scratch
 from toolkit.errors import InputError
 from toolkit.kernels import chebyshev_of_average
 from toolkit.mesh.core import TriangleMesh
@@ -117,7 +118,7 @@ class SmoothingFilter:
         self.coefficients = filter_coefficients(parameters.steps, parameters.lambda_, parameters.mu)
         # Terms below single precision's rounding are passes for nothing.
         tail = np.cumsum(np.abs(self.coefficients[::-1]))[::-1]
-        self._coefficients32 = self.coefficients[: max(1, int(np.count_nonzero(tail > 3e-8)))]
+        self._coefficients32 = self.coefficients[: max(1, int(np.count_nonzero(tail > 1.5e-7)))]
 
     def smooth(self, values: NDArray[np.floating]) -> NDArray[np.floating]:
         """``M values`` for an array ``(V, C)`` in the original numbering, in the precision that it has."""
@@ -131,16 +132,20 @@ class SmoothingFilter:
         Rounding is that of the block's type: give small deltas, not positions, where float32 is used.
         """
         coefficients = self._coefficients32 if block.dtype == np.float32 else self.coefficients
-        smooth = chebyshev_of_average(
+        flat = block.reshape(len(block), -1)
+        smooth = np.empty_like(flat)
+        chebyshev_of_average(
             self._starts,
             self._neighbours,
             self._share.astype(block.dtype),
             coefficients.astype(block.dtype),
             self._bandwidth,
             _STEPS_TOGETHER,
-            block.reshape(len(block), -1),
+            flat,
+            smooth,
+            scratch("smoothing", smooth),
         )
-        return np.asarray(smooth).reshape(block.shape)
+        return smooth.reshape(block.shape)
 
 
 def filter_coefficients(steps: int, lambda_: float, mu: float) -> NDArray[np.float64]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from toolkit.contacts import ContactPairs
 from toolkit.errors import InputError
+from toolkit.kernels import edge_frames, keep_largest_change
 from toolkit.mesh.topology import connected_components
 from toolkit.operators import gradient
 from toolkit.progress import Progress, silent
@@ -194,8 +195,7 @@ def triangle_weights(rest: Array, shapes: NDArray[np.floating], triangles: NDArr
     inverse, flat = _inverse_edge_frames(rest, triangles)
     largest = np.zeros(len(triangles))
     for shape in shapes:
-        change = _edge_frames(np.asarray(shape, dtype=np.float64), triangles) @ inverse - np.eye(3)
-        largest = np.maximum(largest, np.einsum("fij,fij->f", change, change))
+        keep_largest_change(np.asarray(shape, dtype=np.float64), triangles, inverse, largest)
     return 1 / (1 + np.where(flat, 0, largest))
 
 
@@ -216,11 +216,9 @@ def _block_diagonal(blocks: Array) -> sp.bsr_matrix:
 
 
 def _edge_frames(vertices: Array, triangles: NDArray[np.integer]) -> Array:
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    e0, e1 = b - a, c - a
-    cross = np.cross(e0, e1)
-    length = np.sqrt(np.sum(cross**2, axis=1))
-    return np.stack([e0, e1, cross / np.sqrt(np.maximum(length, 1e-300))[:, None]], axis=2)
+    frames = np.empty((len(triangles), 3, 3))
+    edge_frames(vertices, triangles, frames)
+    return frames
 
 
 def line_gradients(rest: Array, shape: Array, edges: Ids, vectors: Array) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 
 from toolkit.blocks import block_size, map_blocks
 from toolkit.decomposition import Decomposer, decompose_block
+from toolkit.meshio import FrameSequence
 from toolkit.progress import Progress
 from toolkit.shot import Shot, StageFolder
 from toolkit.stabilisation import HeadMotion, fit_head_motion
@@ -29,13 +30,13 @@ def work(shot: Shot, folder: StageFolder, progress: Progress, map_blocks: MapBlo
     folder.save("rotations", motion.rotations)
     folder.save("translations", motion.translations)
     shape = (sequence.n_frames, sequence.n_vertices, 3)
-    arrays = ("smooth_deltas", "details")
-    for name in arrays:
-        folder.create(name, shape)
-    fill = partial(decompose_block, sequence, decomposer, motion)
+    folder.create("smooth_deltas", shape)
+    folder.create("details", shape)
+    folder.create("detail_energy", shape[:1], np.float64)
+    arrays = ("smooth_deltas", "details", "detail_energy")
+    fill = partial(_decompose, sequence, decomposer, motion)
     blocks, size = StageBlocks(arrays, _open_blocks, shot.path, folder.path, fill), block_size(sequence.n_vertices)
     map_blocks(blocks, sequence.n_frames, size, what="decomposing frames", progress=progress)
-    folder.save("detail_energy", _rms_per_frame(folder.array("details")))
     cosine = np.clip((np.trace(motion.rotations, axis1=1, axis2=2) - 1) / 2, -1, 1)
     folder.numbers |= {
         "head_turns_degrees": float(np.degrees(np.arccos(cosine)).max()),
@@ -62,9 +63,19 @@ def _open_blocks(shot_path: Path, written: Path) -> Fill:
     neighbour = np.array(folder.array("neighbour"))
     decomposer = Decomposer(load_mesh(shot, "source"), shot.config.smoothing, neighbour)
     motion = HeadMotion(np.array(folder.array("rotations")), np.array(folder.array("translations")))
-    return partial(decompose_block, load_sequence(shot), decomposer, motion)
+    return partial(_decompose, load_sequence(shot), decomposer, motion)
 
 
-def _rms_per_frame(details: np.ndarray) -> np.ndarray:
-    """RMS length of the motion detail in each frame, ``(T,)``: how wrinkled the face is."""
-    return np.array([np.sqrt(np.mean(np.einsum("vi,vi->v", frame, frame))) for frame in details])
+def _decompose(
+    sequence: FrameSequence,
+    decomposer: Decomposer,
+    motion: HeadMotion,
+    start: int,
+    stop: int,
+    smooth_deltas: np.ndarray,
+    details: np.ndarray,
+    energy: np.ndarray,
+) -> None:
+    """One block; ``energy`` (B,) is the RMS length of each frame's motion detail: how wrinkled the face is."""
+    decompose_block(sequence, decomposer, motion, start, stop, smooth_deltas, details)
+    energy[:] = [np.sqrt(np.vdot(frame, frame) / len(frame)) for frame in details]

@@ -49,7 +49,7 @@ STAGES: dict[str, Stage] = {
             ("inputs",),
             ("stabilise", "smoothing"),
             decompose.work,
-            version=2,
+            version=3,
             by_frames=True,
             reads=("source_vertices.npy", "source_triangles.npy"),
         ),
