@@ -77,6 +77,8 @@ def main() -> int:
                 performers = {vertices: performer_at(vertices)}  # one at a time: a large one takes a gigabyte
             rows.append(_measured(row, performers[vertices], work / "shot", options))
             print(_line(rows[-1]), flush=True)
+            if options.by_stage:
+                print(_stages(rows[-1]), flush=True)
     if options.share != 1:
         print("~ in proportion to the frames, from the shorter takes that were run")
     print(f"goal: at least {_GOAL} times as fast as the paper; x files, x solves: times the floors (see --help)")
@@ -118,6 +120,11 @@ def _line(row: dict[str, Any]) -> str:
     )
 
 
+def _stages(row: dict[str, Any]) -> str:
+    parts = [f"{name} {seconds:.1f} s (CPU {row['stages_cpu'][name]:.1f})" for name, seconds in row["stages"].items()]
+    return f"    {', '.join(parts)}; floors {row['read_write_s']:.1f} s and {row['substitutions_s']:.1f} s"
+
+
 def _check_space(folder: Path, rows: list[PaperRow], options: argparse.Namespace) -> None:
     """Five takes lie on the disk at a time: the take, two arrays of the decomposition, the result, the copy."""
     largest = max(row.vertices * options.vertices_share * row.frames * options.share for row in rows)
@@ -149,6 +156,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--vertices-share", type=float, default=1.0, help="share of the vertices, for a quick look (1)")
     parser.add_argument("--runs", type=int, default=1, help="runs of each row, the fastest counts (1)")
     parser.add_argument("--work", type=Path, help="where to put the takes; up to 26 GiB for the last row")
+    parser.add_argument("--by-stage", action="store_true", help="say under each row what each stage took")
     parser.add_argument("--json", action="store_true", help="end with one line of JSON")
     return parser
 

@@ -42,8 +42,8 @@ def main() -> int:
     run = runs[len(runs) // 2]
     print(f"{n_vertices:,} vertices, {options.frames} frames, K = {run.bases}, median of {len(runs)} runs")
     for name, seconds in run.stages.items():
-        print(f"  {name:<10} {seconds:7.2f} s")
-    print(f"  {'total':<10} {run.total_s:7.2f} s   CPU {run.cpu_s:.1f} s")
+        print(f"  {name:<10} {seconds:7.2f} s   CPU {run.stages_cpu[name]:6.2f} s")
+    print(f"  {'total':<10} {run.total_s:7.2f} s   CPU {run.cpu_s:6.2f} s")
     print(f"  peak memory {run.own_gb:.2f} GB of its own, {run.peak_gb:.2f} GB with mapped files")
     print(f"  reading and writing the same bytes: {floor:.2f} s; total is {run.total_s / floor:.1f} times that")
     if options.json:

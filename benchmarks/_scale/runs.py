@@ -43,6 +43,7 @@ class Run:
     total_s: float
     cpu_s: float
     stages: dict[str, float]
+    stages_cpu: dict[str, float]
     bases: int
     own_gb: float
     peak_gb: float
@@ -73,7 +74,7 @@ def write_inputs(folder: Path, mesh: TriangleMesh, lines: list[FeatureLine], n_b
 def run_measured(shot: Path) -> Run:
     """Run the stages from decomposition to written frames in a fresh process."""
     said, own, peak = _child("stages", shot)
-    return Run(said["total_s"], said["cpu_s"], said["stages"], said["bases"], own, peak)
+    return Run(said["total_s"], said["cpu_s"], said["stages"], said["stages_cpu"], said["bases"], own, peak)
 
 
 def substitution_floor(shot: Path) -> float:
