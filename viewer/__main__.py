@@ -19,6 +19,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("shot", metavar="SHOT", type=Path, help="the shot folder, finished or not (scripts/new_shot.py)")
     made.add_argument("--script", type=Path, metavar="FILE", help="replay events from a file of JSON lines")
     made.add_argument("--record", type=Path, metavar="FILE", help="write every event to a file of JSON lines")
+    made.add_argument("--state", type=Path, metavar="FILE", help="keep what is shown in a JSON file, for tests")
     made.add_argument("--size", type=_size, default=(1500, 920), metavar="WxH", help="of the window (1500x920)")
     made.add_argument("-v", "--verbose", action="store_true", help="say more")
     return made
@@ -54,7 +55,7 @@ def _show(options: argparse.Namespace, probe: object) -> int:
         probe.check()  # type: ignore[attr-defined]
         from viewer.view.window import Window
 
-        Window(app, options.size, player, recorder).run()
+        Window(app, options.size, player, recorder, options.state).run()
     finally:
         worker.stop()
     return 0

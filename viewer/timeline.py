@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw
 
 from toolkit.rendering.text import font, text_width
 
-__all__ = ["Layout", "Timeline", "at", "draw"]
+__all__ = ["Drawer", "Layout", "Timeline", "at", "draw"]
 
 _PAPER, _STRIP, _WINDOW = (24, 25, 28), (36, 38, 42), (62, 96, 140)
 _INK, _FAINT, _HEAD = (198, 201, 207), (92, 96, 103), (255, 206, 84)
@@ -101,17 +101,51 @@ def at(layout: Layout, window: tuple[int, int] | None, x: float, y: float) -> tu
 
 def draw(layout: Layout, shown: Timeline) -> NDArray[np.uint8]:
     """The picture ``(height, width, 3)`` uint8."""
+    return Drawer().draw(layout, shown)
+
+
+class Drawer:
+    """Draws, and keeps what does not change while it plays: all but the playhead."""
+
+    def __init__(self) -> None:
+        self._known: tuple[Layout, Timeline] | None = None
+        self._still: Image.Image | None = None
+
+    def draw(self, layout: Layout, shown: Timeline) -> NDArray[np.uint8]:
+        """The picture ``(height, width, 3)`` uint8."""
+        if self._still is None or self._known is None or not _same(self._known, (layout, shown)):
+            self._still, self._known = _draw_still(layout, shown), (layout, shown)
+        image = self._still.copy()
+        _draw_head(ImageDraw.Draw(image), layout, shown)
+        return np.asarray(image)
+
+
+def _same(one: tuple[Layout, Timeline], other: tuple[Layout, Timeline]) -> bool:
+    """Whether all but the frame is the same."""
+    (layout, a), (other_layout, b) = one, other
+    if layout != other_layout or (a.window, a.title, tuple(a.keys)) != (b.window, b.title, tuple(b.keys)):
+        return False
+    pairs = ((a.source, b.source), (a.edited, b.edited), (a.marked, b.marked))
+    return all(
+        (p is None and q is None) or (p is not None and q is not None and np.array_equal(p, q)) for p, q in pairs
+    )
+
+
+def _draw_still(layout: Layout, shown: Timeline) -> Image.Image:
     image = Image.new("RGB", (layout.width, layout.height), _PAPER)
     pen = ImageDraw.Draw(image)
     _draw_strip(pen, layout, shown)
     _draw_ruler(pen, layout, shown)
     if layout.curves[1] - layout.curves[0] > 12 * layout.scale:
         _draw_curves(pen, layout, shown)
+    return image
+
+
+def _draw_head(pen: ImageDraw.ImageDraw, layout: Layout, shown: Timeline) -> None:
     x = layout.x(shown.frame)
     pen.line((x, layout.strip[0], x, layout.height), fill=_HEAD, width=max(1, round(1.5 * layout.scale)))
     half = 5 * layout.scale
     pen.polygon([(x - half, layout.ruler[0]), (x + half, layout.ruler[0]), (x, layout.ruler[0] + 1.6 * half)], _HEAD)
-    return np.asarray(image)
 
 
 def _draw_strip(pen: ImageDraw.ImageDraw, layout: Layout, shown: Timeline) -> None:

@@ -82,7 +82,9 @@ class Viewpoint:
 
     def zoomed(self, notches: float) -> Viewpoint:
         """Closer by some notches of the wheel."""
-        return replace(self, distance=float(np.clip(self.distance * 0.9**notches, _NEAREST, _FARTHEST)))
+        return replace(
+            self, distance=float(np.clip(self.distance * 0.9 ** np.clip(notches, -99, 99), _NEAREST, _FARTHEST))
+        )
 
     def _toward(self) -> Array:
         a, e = np.radians([self.azimuth, self.elevation])

@@ -24,7 +24,9 @@ def key(app: App, event: Key) -> None:
     """A key was pressed."""
     shift = "shift" in event.modifiers
     name = event.name
-    if name == "?" or (name == "/" and shift):
+    if name == "q" and "ctrl" in event.modifiers:
+        run(app, Command("quit"))
+    elif name == "?" or (name == "/" and shift):
         run(app, Command("help"))
     elif name in _KEYS and not (name == "escape" and app.mode.key(event)):
         _KEYS[name](app, shift)

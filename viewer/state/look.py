@@ -99,8 +99,9 @@ def _view_rows(app: App) -> list[Row]:
 
 def status_line(app: App) -> tuple[str, str]:
     """What is going on, what a click will do, how long the last solve took."""
-    if app.worker.progress is not None:
-        what, done, total = app.worker.progress
+    progress = app.worker.progress  # once: the worker goes on meanwhile
+    if progress is not None:
+        what, done, total = progress
         share = f" {done} of {total}" if total else ""
         return f"{what}{share} ... (Esc cancels)", "plain"
     words = [app.message] if app.message else []
@@ -178,6 +179,7 @@ def help_lines(app: App) -> list[tuple[str, str]]:
         ("right drag, wheel", "pan, zoom"),
         ("ctrl-right drag", "turn the light"),
         ("esc", "cancel what is running, or close this"),
+        ("ctrl-q", "quit"),
         ("?", "these keys"),
     ]
     return lines

@@ -31,7 +31,7 @@ class Pane:
 
     def __init__(self, window: Any, app: App, index: int, send: Callable[[Pointer], None]) -> None:
         self.app, self.index, self._send = app, index, send
-        self.widget, self._scene = native.new_scene(window)
+        self.widget, self.scene = native.new_scene(window)
         self.widget.set_on_mouse(self._mouse)
         self._face: DynamicMesh | None = None
         self._triangles: Any = None
@@ -84,7 +84,7 @@ class Pane:
             triangles = max(512, 2 * len(corners) // overlay.CORNERS)
             self._capacity = triangles * overlay.CORNERS
             self._overlay = DynamicMesh(
-                self._scene, f"overlay {self._capacity}", overlay.triangles_for(triangles), self._capacity
+                self.scene, f"overlay {self._capacity}", overlay.triangles_for(triangles), self._capacity
             )
         to_positions, to_colors = self._overlay.next_buffers()
         to_positions[: len(corners)], to_colors[: len(corners)] = corners, colors
@@ -98,7 +98,7 @@ class Pane:
             if mesh is not None:
                 mesh.remove()
         self._wires = None
-        self._face = DynamicMesh(self._scene, "face", triangles, n_vertices)
+        self._face = DynamicMesh(self.scene, "face", triangles, n_vertices)
         self._triangles = triangles
         self._normals = np.zeros((n_vertices, 3), np.float32)
 
@@ -111,7 +111,7 @@ class Pane:
         if self._wires is None:
             self._edges = self.app.edges(self.index)
             self._wires = DynamicMesh(
-                self._scene, "wires", overlay.wire_triangles(len(self._edges)), 4 * len(self._edges)
+                self.scene, "wires", overlay.wire_triangles(len(self._edges)), 4 * len(self._edges)
             )
         to_positions, to_colors = self._wires.next_buffers()
         to_colors[:] = _WIRE

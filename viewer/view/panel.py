@@ -39,6 +39,7 @@ class Panel:
         self._shape: tuple[Any, ...] = ()
         self._updates: list[Callable[[Any], None]] = []
         self._grid: Any = None
+        self.named: dict[str, Any] = {}
         self._quiet = False
         self._moving: dict[str, tuple[float, float]] = {}
 
@@ -66,6 +67,7 @@ class Panel:
     def _build(self, rows: Sequence[Row]) -> None:
         column = gui.Vert(0.28 * self._em)
         self._grid = None
+        self.named.clear()
         self._updates = [self._make(row, column) for row in rows]
         self._proxy.set_widget(column)
 
@@ -128,6 +130,7 @@ class Panel:
         widget.toggleable = row.on is not None
         name = row.name
         widget.set_on_clicked(lambda: self._sent(name))
+        self.named[name] = widget
 
         def update(new: kinds.Button) -> None:
             widget.text = new.text
@@ -141,6 +144,7 @@ class Panel:
         widget = gui.Checkbox(row.text)
         widget.set_on_checked(lambda on: self._sent(row.name, bool(on)))
         column.add_child(widget)
+        self.named[row.name] = widget
 
         def update(new: kinds.Check) -> None:
             widget.checked = new.on
@@ -154,6 +158,7 @@ class Panel:
             widget.add_item(words)
         widget.set_on_selection_changed(lambda text, index: self._sent(row.name, names[index]))
         self._line(column, row.text, widget)
+        self.named[row.name] = widget
 
         def update(new: kinds.Choice) -> None:
             if new.chosen in names:
@@ -166,6 +171,7 @@ class Panel:
         widget.set_limits(row.low, row.high)
         widget.set_on_value_changed(lambda value: self._sent(row.name, float(value), False))
         self._line(column, row.text, widget)
+        self.named[row.name] = widget
 
         def update(new: kinds.Slider) -> None:
             if new.name not in self._moving:  # never against the user's hand
@@ -178,9 +184,10 @@ class Panel:
         widget = gui.NumberEdit(gui.NumberEdit.INT if row.whole else gui.NumberEdit.DOUBLE)
         widget.set_limits(row.low, row.high)
         if not row.whole:
-            widget.decimal_precision = 4
+            widget.decimal_precision = 5
         widget.set_on_value_changed(lambda value: self._sent(row.name, int(value) if row.whole else float(value)))
         self._line(column, row.text, widget)
+        self.named[row.name] = widget
 
         def update(new: kinds.Number) -> None:
             widget.set_value(new.value)
@@ -191,6 +198,7 @@ class Panel:
         widget = gui.TextEdit()
         widget.set_on_value_changed(lambda text: self._sent(row.name, str(text)))
         self._line(column, row.text, widget)
+        self.named[row.name] = widget
 
         def update(new: kinds.Entry) -> None:
             widget.text_value = new.value
@@ -208,6 +216,7 @@ class Panel:
 
         widget.set_on_selection_changed(clicked)
         column.add_child(widget)
+        self.named[row.name] = widget
 
         def update(new: kinds.Items) -> None:
             nonlocal shown

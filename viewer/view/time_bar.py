@@ -39,18 +39,19 @@ class TimeBar:
             self._speed.add_item(f"{speed:g}x")
         self._speed.set_on_selection_changed(lambda text, index: send(Command("speed", SPEEDS[index])))
         self.buttons.add_child(self._speed)
-        self._words = gui.Label("frame 00000 of 00000   00:00.00  ")
+        self._words = gui.Label("frame 00000 of 00000   00:00.00    ")
         self.buttons.add_child(self._words)
         self.buttons.add_stretch()
-        self._window_words = gui.Label("window of the edit: 00000 to 00000")
+        self._window_words = gui.Label("window 00000 - 00000")
         self.buttons.add_child(self._window_words)
-        for text, which in (("From here", "first"), ("To here", "last"), ("All", "all")):
+        for text, which in (("[", "first"), ("]", "last"), ("All", "all")):
             button = gui.Button(text)
             button.horizontal_padding_em, button.vertical_padding_em = 0.5, 0.1
             button.set_on_clicked(lambda which=which: self._set_window(which))
             self.buttons.add_child(button)
         self.picture = gui.ImageWidget()
         self.picture.set_on_mouse(self._mouse)
+        self._drawer = timeline.Drawer()
         self._size = (0, 0)
         self._grip = ""
 
@@ -65,16 +66,15 @@ class TimeBar:
         play = app.play
         seconds = play.seconds
         self._words.text = (
-            f"frame {play.frame} of {play.n_frames}   {int(seconds // 60):02d}:{seconds % 60:05.2f}   "
-            f"{play.fps:g} a second" + 12 * " "  # room, as the label is laid out once
+            f"frame {play.frame} of {play.n_frames}   {int(seconds // 60):02d}:{seconds % 60:05.2f}" + 8 * " "
         )
         self._play.text = "Pause" if play.playing else "Play"
         self._loop.is_on = play.loop
         self._speed.selected_index = SPEEDS.index(play.speed)
         window = play.window
-        self._window_words.text = (f"window: {window[0]} to {window[1]}" if window else "window: all frames") + 8 * " "
+        self._window_words.text = (f"window {window[0]} - {window[1]}" if window else "window: all") + 8 * " "
         if self._size[0]:
-            pixels = timeline.draw(self._layout(), app.timeline())
+            pixels = self._drawer.draw(self._layout(), app.timeline())
             self.picture.update_image(image_of(pixels))
 
     def _layout(self) -> timeline.Layout:

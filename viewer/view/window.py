@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import logging
 import time
+from functools import partial
+from pathlib import Path
 from typing import Any
+
+import numpy as np
+from PIL import Image
 
 from viewer.legend import draw_legend
 from viewer.script import Player, Recorder
@@ -15,6 +20,7 @@ from viewer.view import open3d_calls as native
 from viewer.view.open3d_calls import gui, image_of
 from viewer.view.pane import Pane
 from viewer.view.panel import Panel
+from viewer.view.state_file import write_state
 from viewer.view.time_bar import TimeBar
 
 __all__ = ["Window"]
@@ -36,8 +42,9 @@ class Window:
         size: tuple[int, int] = (1500, 920),
         player: Player | None = None,
         recorder: Recorder | None = None,
+        state_file: Path | None = None,
     ) -> None:
-        self.app, self._player, self._recorder = app, player, recorder
+        self.app, self._player, self._recorder, self._state_file = app, player, recorder, state_file
         self.application = gui.Application.instance
         self.application.initialize()
         title = f"Mien: {app.shot.path.resolve().name}"
@@ -62,6 +69,7 @@ class Window:
         self._last = time.monotonic()
         self._settle = 3
         self._quitting = False
+        self._stale, self._was_busy = True, False
 
     def run(self) -> None:
         """Until the window is closed."""
@@ -76,6 +84,20 @@ class Window:
         except Exception as error:
             log.exception("%s", event)
             self.app.say(f"that went wrong: {type(error).__name__}: {error}", "bad")
+
+    def screenshot(self, path: Path) -> None:
+        """Save both panes as a picture, once the renderer has made them."""
+        found: dict[int, Any] = {}
+
+        def got(index: int, pixels: Any) -> None:
+            found[index] = pixels
+            if len(found) == len(self.panes):
+                height = min(len(pixels) for pixels in found.values())
+                both = np.concatenate([found[index][:height, :, :3] for index in range(len(found))], axis=1)
+                Image.fromarray(np.ascontiguousarray(both)).save(path)
+
+        for index, pane in enumerate(self.panes):
+            native.save_scene(pane.scene, partial(got, index))
 
     # -- building -------------------------------------------------------------------------------------------------
 
@@ -152,7 +174,16 @@ class Window:
             changes.add("camera")
         if changes:
             self._draw(changes)
+        if self._state_file is not None:
+            self._write_state(bool(changes))
         return bool(changes)
+
+    def _write_state(self, changed: bool) -> None:
+        """After changes, and once more when they have been drawn."""
+        busy = self.app.worker.busy
+        if changed or self._stale or busy != self._was_busy:
+            self._stale, self._was_busy = changed, busy
+            write_state(self._state_file, self)  # type: ignore[arg-type]
 
     def _draw(self, changes: set[str]) -> None:
         for pane in self.panes:
