@@ -11,14 +11,17 @@ from toolkit.quality import (
     coating_energy,
     contact_gaps,
     crossing_triangles,
+    detail_energy,
     detail_error,
+    face_parts,
     flipped_triangles,
     jitter,
     motion_error,
     rim_gaps,
     rim_neighbourhood,
-    second_differences,
+    unexplained_trembling,
     unrest,
+    unsteadiness,
 )
 
 
@@ -46,6 +49,9 @@ def test_lids_must_close_where_the_source_does(mouth):
     gaps = contact_gaps(opening, [vertices, closed], [2 * vertices, 2 * almost], vertices, 2 * vertices, 10.0, 20.0)
     assert gaps.touching.tolist() == [0, 14]
     assert gaps.closed_frames == 1
+    # The whole rim's mean gap, in each face's own height.
+    assert gaps.source_mean == pytest.approx([0.1 * (10 + 2 * 2**0.5) / 7, 0])
+    assert gaps.mean[0] == pytest.approx(gaps.source_mean[0])
     assert gaps.excess[0] == 0
     # 0.2 apart on either side of the closed line, on a face twice as large: 0.4 of 20.
     assert gaps.worst == pytest.approx(0.02)
@@ -107,19 +113,76 @@ def test_neighbourhood_grows_by_rings(bump):
     assert sizes[0] < sizes[1] < sizes[2]
 
 
-def test_second_differences_of_a_parabola(bump):
-    t = np.arange(6.0)[:, None, None]
+def test_differences_of_a_parabola_and_of_a_shake(bump):
+    t = np.arange(8.0)[:, None, None]
     speed = np.linspace(0, 1, bump.n_vertices)[:, None] * np.array([1.0, 0, 0])
-    frames = bump.vertices + 3 * t + 0.5 * t**2 * speed
-    np.testing.assert_allclose(second_differences(frames), np.linspace(0, 1, bump.n_vertices), atol=1e-9)
-    assert not second_differences(frames[:2]).any()
+    found = unsteadiness(bump.vertices + 0.5 * t**2 * speed)
+    np.testing.assert_allclose(found.bend, np.linspace(0, 1, bump.n_vertices), atol=1e-9)
+    np.testing.assert_allclose(found.shiver, 0, atol=1e-9)
+    shaken = unsteadiness(bump.vertices + (-1.0) ** t * speed)
+    np.testing.assert_allclose(shaken.speed, 2 * np.linspace(0, 1, bump.n_vertices), atol=1e-9)
+    np.testing.assert_allclose(shaken.shiver, 16 * np.linspace(0, 1, bump.n_vertices), atol=1e-9)
+    assert not unsteadiness(bump.vertices[None]).speed.any()
 
 
-def test_jitter_is_measured_in_the_sources_size(take):
-    source = second_differences(take)
-    assert jitter(source, second_differences(4 * take), 4.0).rms == pytest.approx(1)
-    noisy = take + 0.01 * np.random.default_rng(0).normal(size=take.shape)
-    assert jitter(source, second_differences(noisy), 1.0).rms > 2
+@pytest.fixture(scope="module")
+def acted() -> np.ndarray:
+    """A take (120, 500, 3) on a ball of size 2: four smooth expressions in different places."""
+    rng = np.random.default_rng(7)
+    rest = rng.normal(size=(500, 3))
+    rest /= np.linalg.norm(rest, axis=1, keepdims=True)
+    t = np.linspace(0, 4, 120)
+    curves = np.maximum(np.sin(2 * np.pi * np.outer(t, [0.5, 0.8, 1.1, 0.3]) + [0, 1, 2, 3]), 0) ** 3
+    places = np.exp(-4 * ((rest[:, None] - rest[[3, 50, 200, 400]]) ** 2).sum(axis=2))
+    return rest + 0.1 * np.einsum("tk,vk,vi->tvi", curves, places, rest)
+
+
+def _beside(source, result, scale=1.0):
+    return jitter(unsteadiness(source), unsteadiness(result), scale, source[0], 2.0)
+
+
+def test_larger_motion_is_not_jitter(acted):
+    rest = acted[0]
+    larger = 3 * (rest + 1.6 * (acted - rest))
+    found = _beside(acted, larger, 3.0)
+    assert (found.whole, found.typical, found.worst) == pytest.approx((1, 1, 1), abs=1e-6)
+    assert found.bend == pytest.approx(1.6)
+    assert unexplained_trembling(acted, larger) == pytest.approx(unexplained_trembling(acted, acted))
+    # Nor is more motion here and less there.
+    uneven = rest + np.linspace(0.2, 2, 500)[:, None] * (acted - rest)
+    assert _beside(acted, uneven).worst == pytest.approx(1, abs=0.1)
+    assert unexplained_trembling(acted, uneven) < 0.01
+
+
+def test_noise_on_every_frame_is_jitter(acted):
+    noise = np.random.default_rng(0).normal(scale=1e-4 * 2, size=acted.shape)
+    found = _beside(acted, acted + noise)
+    assert found.whole > 1.2
+    assert found.typical > 2
+    assert unexplained_trembling(acted, acted + noise) > 0.5
+    assert unexplained_trembling(acted, acted) < 0.01
+
+
+def test_weights_that_flicker_are_jitter(acted):
+    rest, rng = acted[0], np.random.default_rng(1)
+    flicker = rest + (1 + 0.05 * rng.normal(size=(len(acted), 1, 1))) * (acted - rest)
+    assert _beside(acted, flicker).whole > 1.1
+    assert unexplained_trembling(acted, flicker) > 0.3
+
+
+def test_one_trembling_part_shows_though_the_whole_does_not(acted):
+    local = acted.copy()
+    part = face_parts(acted[0]) < 8
+    local[:, part] += np.random.default_rng(2).normal(scale=3e-5, size=local[:, part].shape)
+    found = _beside(acted, local)
+    assert found.whole < 1.1
+    assert found.worst > 3
+
+
+def test_a_still_source_allows_no_jitter(acted):
+    still = np.repeat(acted[:1], 20, axis=0)
+    assert _beside(still, still).whole == 1
+    assert _beside(still, acted[:20]).whole == np.inf
 
 
 def test_unrest_sees_one_vertex_in_one_frame(bump):
@@ -167,3 +230,9 @@ def test_coating_energy_of_a_smooth_surface_is_nothing(bump):
     assert coating_energy(bump.vertices, bump.vertices, bump.triangles) == 0
     rough = bump.vertices + 0.01 * np.random.default_rng(2).normal(size=bump.vertices.shape)
     assert coating_energy(rough, bump.vertices, bump.triangles) > 0.005
+
+
+def test_detail_energy_takes_the_gain():
+    details = np.ones((3, 10, 3)) * np.array([0, 1, 2])[:, None, None]
+    assert detail_energy(details) == pytest.approx([0, 3**0.5, 2 * 3**0.5])
+    assert detail_energy(details, np.full(10, 0.5)) == pytest.approx([0, 0.75**0.5, 3**0.5])

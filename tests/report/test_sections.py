@@ -5,10 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from toolkit.contacts import ContactPairs
+from toolkit.quality import detail_energy
 from toolkit.rendering.takes import View
 from toolkit.report import ReportData, build, sections
-from toolkit.report.measures import contact_gaps, detail_energy, jitter
 from toolkit.report.pictures import bases_figures, coating_figures, motion_figures, registration_figures
 from toolkit.smoothing import SmoothingFilter, SmoothingParameters
 
@@ -84,29 +83,3 @@ def test_all_sections_make_one_page(count):
     assert page.count("</i>basis") == (count if 1 < count <= 6 else 0)
     assert re.search(r"<td>Total \(s\)</td><td[^>]*>3.75</td>", page.replace("\n", ""))
     assert page.count("<section") == 7
-
-
-def test_gaps_are_shares_of_the_width_by_opening():
-    # Two openings of width 2 and 4 with one pair each, which open by 0.1 t.
-    pairs = ContactPairs(
-        vertex=np.array([2, 6]),
-        edge=np.array([[3, 3], [7, 7]]),
-        share=np.zeros(2),
-        closes=np.ones(2, bool),
-        corners=np.array([[0, 1], [4, 5]]),
-    )
-    rest = np.zeros((8, 3))
-    rest[1, 0], rest[5, 0] = 2, 4
-    frames = np.stack([rest + np.eye(8)[:, [2]] * [0, 0.1 * t, 0] for t in range(4)])
-    gaps = contact_gaps(lambda a, b: frames[a:b], 4, rest, pairs, ["eye", "mouth"])
-    assert list(gaps) == ["eye", "mouth"]
-    assert gaps["eye"] == pytest.approx([0, 5, 10, 15])
-    assert gaps["mouth"] == pytest.approx([0, 0, 0, 0])
-
-
-def test_jitter_is_blind_to_steady_motion():
-    t = np.arange(6.0)[:, None, None]
-    steady = np.tile(t, (1, 4, 3))
-    shaking = steady + 0.5 * (-1.0) ** t
-    assert jitter(lambda a, b: steady[a:b], 6, 4) == pytest.approx(0, abs=1e-12)
-    assert jitter(lambda a, b: shaking[a:b], 6, 4) == pytest.approx(2 * np.sqrt(3))

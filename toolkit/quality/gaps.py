@@ -23,7 +23,7 @@ class ContactGaps:
 
     ``touching`` (T,) how many of the rims' ``vertices`` touch in the source; ``excess`` (T,) the largest gap of these
     on the target beyond what is allowed to stay, as a share of the target's face height (0 where none touches);
-    ``mean`` (T,) the mean gap over the whole rim, same unit.
+    ``mean`` (T,) the mean gap over the whole rim, same unit, ``source_mean`` that of the source in its own height.
     """
 
     name: str
@@ -31,6 +31,7 @@ class ContactGaps:
     touching: NDArray[np.int64]
     excess: Array
     mean: Array
+    source_mean: Array
 
     @property
     def worst(self) -> float:
@@ -83,14 +84,18 @@ def contact_gaps(
     """
     at_rest = rim_gaps(opening, source_rest) <= touching * source_height
     allowed = np.where(at_rest, rim_gaps(opening, target_rest), 0.0)
-    count, excess, mean = [], [], []
+    count, excess, mean, source_mean = [], [], [], []
     for before, after in zip(source, target, strict=True):
-        touches = rim_gaps(opening, before) <= touching * source_height
+        own = rim_gaps(opening, before)
+        touches = own <= touching * source_height
         gap = rim_gaps(opening, after)
         count.append(np.count_nonzero(touches))
         excess.append(float(np.max((gap - allowed)[touches], initial=0)) / target_height)
         mean.append(float(gap.mean()) / target_height)
-    return ContactGaps(opening.name, len(allowed), np.array(count), np.array(excess), np.array(mean))
+        source_mean.append(float(own.mean()) / source_height)
+    return ContactGaps(
+        opening.name, len(allowed), np.array(count), np.array(excess), np.array(mean), np.array(source_mean)
+    )
 
 
 def _to_polyline(points: NDArray[np.floating], line: NDArray[np.floating]) -> Array:

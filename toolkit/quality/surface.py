@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from toolkit.decomposition import coating
 from toolkit.mesh.geometry import face_normals
 
-__all__ = ["DetailError", "coating_energy", "detail_error", "flipped_triangles"]
+__all__ = ["DetailError", "coating_energy", "detail_energy", "detail_error", "flipped_triangles"]
 
 Array = NDArray[np.float64]
 
@@ -47,6 +47,12 @@ def detail_error(found: NDArray[np.floating], true: NDArray[np.floating], thresh
 def coating_energy(vertices: Array, smooth: Array, triangles: NDArray[np.integer]) -> float:
     """RMS magnitude of the coating ``L (S - S~)`` (the paper's Eq. 1) of one frame, in mesh units."""
     return float(np.sqrt(np.mean(np.sum(coating(vertices, smooth, triangles) ** 2, axis=1))))
+
+
+def detail_energy(details: NDArray[np.floating], gain: Array | None = None) -> Array:
+    """RMS length ``(T,)`` of details (T, V, 3), each vertex times its ``gain`` (V,); may be memory-mapped."""
+    factor = 1.0 if gain is None else gain**2
+    return np.array([np.sqrt(np.mean(factor * np.einsum("vi,vi->v", f, f, dtype=np.float64))) for f in details])
 
 
 def flipped_triangles(reference: Array, vertices: Array, triangles: NDArray[np.integer]) -> NDArray[np.int64]:

@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from toolkit.contacts import ContactPairs
+from toolkit.feature_lines import find_openings
 from toolkit.progress import Progress, silent
+from toolkit.quality import ContactGaps, contact_gaps, detail_energy, jitter, unsteadiness
 from toolkit.rendering.shots import ShotViews, expressive_frames, open_views
 from toolkit.rendering.takes import View, performance_sheet
 from toolkit.report import sections
 from toolkit.report.data import Figure, ReportData, Section
 from toolkit.report.maps import shot_registration_figures
-from toolkit.report.measures import contact_gaps, detail_energy, jitter
 from toolkit.report.pictures import bases_figures, coating_figures, motion_figures
 from toolkit.shot import Shot
 from toolkit.stages import STAGES
-from toolkit.stages.bases import load_pairs
 from toolkit.stages.decompose import source_decomposer
-from toolkit.stages.inputs import load_sequence
+from toolkit.stages.inputs import load_lines
 from toolkit.stages.register import load_target
 
 __all__ = ["report_data"]
 
 Vector = tuple[float, float, float]
 _UNIT = "unit of the file"
+_SAMPLE = 8000
 
 
 def report_data(
@@ -100,29 +101,38 @@ def _transfer(shot: Shot, views: ShotViews, chosen: list[int]) -> Section:
     deltas = shot.array("decompose", "smooth_deltas")
     strongest = max(chosen, key=lambda t: float(np.abs(deltas[t]).max()))
     numbers: dict[str, Any] = dict(_numbers(shot, "transfer"))
-    sequence, result = load_sequence(shot), shot.array("result", "frames")
-    size = float(_numbers(shot, "register").get("size_ratio", 1.0))
-    before = size * jitter(sequence.read, sequence.n_frames, sequence.n_vertices)
-    after = jitter(lambda a, b: result[a:b], len(result), sequence.n_vertices)
-    numbers |= {"jitter_of_source_scaled": before, "jitter_of_result": after}
-    pairs, names = load_pairs(shot), list(_numbers(shot, "bases").get("openings", []))
-    gaps = _gaps(shot, views, pairs, names)
-    for name, curves in gaps.items():
-        closed = curves["source"] < 2.0
-        if closed.any():
-            numbers[f"largest gap of {name}, % of width, where the source is closed"] = float(
-                curves["result"][closed].max()
-            )
+    numbers |= _trembling(views)
+    gaps = _gaps(shot, views)
+    for gap in gaps:
+        if gap.touching.any():
+            numbers[f"largest gap of {gap.name}, % of the face, where the source's touches"] = 100 * gap.worst
+    curves = {gap.name: {"source": 100 * gap.source_mean, "result": 100 * gap.mean} for gap in gaps}
     return sections.transfer_section(
-        motion_figures([views.source, views.target], strongest, views.face_heights), gaps, numbers
+        motion_figures([views.source, views.target], strongest, views.face_heights), curves, numbers
     )
 
 
-def _gaps(shot: Shot, views: ShotViews, pairs: ContactPairs, names: list[str]) -> dict[str, dict[str, np.ndarray]]:
-    sequence, result = load_sequence(shot), shot.array("result", "frames")
-    source = contact_gaps(sequence.read, sequence.n_frames, views.source.rest, pairs, names)
-    target = contact_gaps(lambda a, b: result[a:b], len(result), views.target.rest, pairs, names)
-    return {name: {"source": source[name], "result": target[name]} for name in source}
+def _trembling(views: ShotViews) -> dict[str, float]:
+    """How much the result trembles beside the source, on an even choice of vertices."""
+    rest = views.source.rest
+    some = np.unique(np.linspace(0, len(rest) - 1, min(_SAMPLE, len(rest))).astype(int))
+    takes = [unsteadiness(view.frame(t)[some] for t in range(view.n_frames)) for view in views.steady()]
+    height, other = views.face_heights
+    found = jitter(takes[0], takes[1], other / height, rest[some], height)
+    return {"jitter_beside_source": found.whole, "jitter_of_the_worst_parts_beside_source": found.worst}
+
+
+def _gaps(shot: Shot, views: ShotViews) -> list[ContactGaps]:
+    openings = find_openings(load_lines(shot), views.source.rest)
+    rest, own = views.source.rest, views.target.rest
+    return [
+        contact_gaps(opening, _frames(views.source), _frames(views.target), rest, own, *views.face_heights)
+        for opening in openings
+    ]
+
+
+def _frames(view: View) -> Iterator[NDArray[np.floating]]:
+    return (view.frame(t) for t in range(view.n_frames))
 
 
 def _details(shot: Shot) -> Section:

@@ -73,7 +73,8 @@ GLOSSARY: tuple[Entry, ...] = (
     ),
     Entry(
         r"jitter",
-        "Frame-to-frame trembling, measured by second differences. The result's should not exceed the source's.",
+        "Trembling from frame to frame beside the source's, scaled by how much each face moves: 1 is as much as the "
+        "performer has. The worst parts are usually calm ones near a quick motion.",
     ),
     Entry(
         r"error_share",

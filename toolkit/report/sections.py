@@ -87,7 +87,10 @@ def transfer_section(
 ) -> Section:
     """Quality of the large-scale transfer; ``gaps`` names an opening and gives its curves (T,) by face."""
     charts = [
-        Chart(line_chart(pair, y_label="gap (% of width)"), f"{name}: mean gap between its rims in every frame.")
+        Chart(
+            line_chart(pair, y_label="gap (% of the face's height)"),
+            f"{name}: mean gap between its rims in every frame.",
+        )
         for name, pair in gaps.items()
     ]
     return Section(
