@@ -45,6 +45,9 @@ VULKAN_LIBRARIES = {
 }
 """What Open3D 0.20 wants besides."""
 
+TEST_TOOLS = {"Xvfb": "xvfb", "xdotool": "xdotool"}
+"""Programs that the viewer's end-to-end tests use, and their Debian packages; without them those tests are left out."""
+
 VULKAN_DRIVER = "mesa-vulkan-drivers"
 DRIVER_FOLDERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d")
 
@@ -127,6 +130,20 @@ def install_packages(packages: list[str]) -> None:
             raise SetupError(f"'{command}' failed with code {result.returncode}; mend that and run: make setup")
 
 
+def offer_test_tools() -> None:
+    """Install what only the viewer's end-to-end tests need, if we may; the set-up does not fail for it."""
+    packages = sorted(package for name, package in TEST_TOOLS.items() if shutil.which(name) is None)
+    if not packages or not sys.platform.startswith("linux"):
+        return
+    try:
+        if os.geteuid() == 0 and shutil.which("apt-get"):
+            install_packages([*packages, "libgl1-mesa-dri"])
+            return
+    except SetupError as error:
+        say(str(error))
+    say(f"without {' and '.join(packages)} the viewer's end-to-end tests are left out")
+
+
 def make_environment(folder: Path) -> Path:
     """Make the virtual environment, anew if it belongs to another Python; return its interpreter."""
     python = folder / "bin" / "python"
@@ -194,6 +211,7 @@ def main(arguments: list[str] | None = None) -> int:
             return 1 if packages else 0
         if packages:
             install_packages(packages)
+        offer_test_tools()
         python = make_environment(options.venv)
         install_project(python, options.extras)
         prove(python)
