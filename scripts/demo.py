@@ -35,6 +35,7 @@ def main(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         target, performer = samples.targets[name], samples.performer
         inputs = ["--source-reference", performer.reference, "--frames", performer.frames, "--fps", performer.fps]
         inputs += ["--target", target.reference, "--landmarks", target.landmarks_head]
+        inputs += ["--source-extras", performer.eyes, "--target-extras", target.eyes]
         _command("new_shot.py", shot, "--force", *inputs, "--feature-lines", target.feature_lines)
         _command("run_all.py", shot)
         _command("7_export.py", shot, "--format", "gltf", "--out", out / f"{name}.glb")

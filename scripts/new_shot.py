@@ -28,6 +28,8 @@ def main(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         options.target,
         landmarks=options.landmarks,
         feature_lines=options.feature_lines,
+        source_extras=options.source_extras,
+        target_extras=options.target_extras,
         fps=options.fps,
         force=options.force,
     )
@@ -49,6 +51,9 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--target", metavar="F", type=Path, required=True, help="the target's neutral mesh, any topology")
     made.add_argument("--landmarks", metavar="F", type=Path, help="landmarks.json with vertex ids on both meshes")
     made.add_argument("--feature-lines", metavar="F", type=Path, help="feature_lines.json with vertex ids")
+    for side in ("source", "target"):
+        what = f"meshes for the {side}'s pictures only, e.g. eyeballs; they ride with the head"
+        made.add_argument(f"--{side}-extras", metavar="F", type=Path, nargs="+", default=[], help=what)
     made.add_argument("--fps", metavar="N", type=float, help="frames a second, if the take does not say it")
     made.add_argument("--force", action="store_true", help="write shot.toml anew if it is there")
     return made

@@ -74,6 +74,39 @@ def test_a_steady_view_holds_the_head_still(shot):
     assert steady.frame(4) == pytest.approx(still, abs=1e-6)
 
 
+def test_extras_ride_with_the_head_on_both_faces(shot, tmp_path):
+    """An eye at the source's front is at the target's front, turned as the target's head is."""
+    config = shot.config
+    place = {"source": [0, 0, 0.8], "target": [0, -2.4, 0]}
+    for side, at in place.items():
+        write_mesh(tmp_path / f"{side}.ply", TriangleMesh(_ball_vertices() * 0.1 + at, open_views(shot).source.triangles))
+    save_config(
+        shot.path / "shot.toml",
+        replace(
+            config,
+            source=replace(config.source, extras=(tmp_path / "source.ply",)),
+            target=replace(config.target, extras=(tmp_path / "target.ply",)),
+        ),
+    )
+    try:
+        views = open_views(Shot(shot.path))
+        for side, view in (("source", views.source), ("target", views.target)):
+            assert view.extras is not None
+            assert view.extras.frame(4).mean(axis=0) == pytest.approx(place[side], abs=0.02)
+            assert len(view.drawn(4)) == len(view.rest) + len(view.extras.rest)
+        (tmp_path / "target.ply").unlink()
+        with pytest.raises(InputError, match=r"target\.ply"):
+            open_views(Shot(shot.path))
+    finally:
+        save_config(shot.path / "shot.toml", config)
+
+
+def _ball_vertices() -> np.ndarray:
+    import trimesh
+
+    return np.asarray(trimesh.creation.icosphere(subdivisions=3).vertices)
+
+
 def test_the_extremes_and_the_calm_frame_are_chosen(shot):
     assert expressive_frames(shot, 3) == [0, 4, 6]
 

@@ -1,10 +1,15 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from toolkit.errors import InputError
+from toolkit.rendering.extras import Extras
+from toolkit.rendering.shading import Material
 from toolkit.rendering.takes import View, choose_frames, performance_sheet, performance_video, pictures_of
+from toolkit.stabilisation import HeadMotion
 
 
 @pytest.fixture
@@ -62,3 +67,19 @@ def test_closing_a_video_early_stops_the_work(views):
     next(stream)
     stream.close()
     assert len(drawn) < 20
+
+
+def test_extras_are_drawn_in_their_own_colour_and_ride_along(views):
+    """A small ball before a large one hides it where it is, and moves with the head."""
+    moved = HeadMotion(np.tile(np.eye(3), (6, 1, 1)), np.array([[0.12 * t, 0, 0] for t in range(6)]))
+    rest, triangles = views[0].rest, views[0].triangles
+    ball = Extras(triangles, 0.3 * rest + [0, 0, 1.2], moved, Material((0.9, 0.0, 0.0)))
+    still = replace(views[0], frame=lambda t: rest, extras=ball)
+    camera = still.camera(0.8)
+    images = [image.astype(int) for image in pictures_of(still, [0, 5], camera, (80, 100))]
+    red = [(image[..., 0] > 100) & (image[..., 1] < 40) for image in images]
+    places = [np.nonzero(mask)[1].mean() for mask in red]
+    assert all(mask.sum() > 100 for mask in red)
+    assert places[1] > places[0] + 10
+    plain = next(iter(pictures_of(replace(still, extras=None), [0], camera, (80, 100)))).astype(int)
+    assert not ((plain[..., 0] > 100) & (plain[..., 1] < 40)).any()

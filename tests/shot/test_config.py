@@ -35,7 +35,9 @@ def test_parameters_are_read_and_written(tmp_path: Path) -> None:
     assert config.smoothing == SmoothingParameters(steps=20, lambda_=0.4)
     assert config.bases.count == 7
     assert config.details.gain == 1.0
-    changed = replace(config, source=replace(config.source, fps=24.0))
+    assert config.source.extras == ()
+    eyes = (tmp_path / "left eye.ply", tmp_path / "right eye.ply")
+    changed = replace(config, source=replace(config.source, fps=24.0, extras=eyes))
     save_config(path, changed)
     assert load_config(path) == changed
 
@@ -50,6 +52,8 @@ def test_parameters_are_read_and_written(tmp_path: Path) -> None:
         ("[smoothing]\nmu = 0.3\n", r"mu = 0\.3"),
         ('[details]\nmethod = "magic"\n', "method is one of"),
         ("[stabilise]\nenabled = 1\n", "should be a bool"),
+        ('extras = "eyes.ply"\n', r"\[target\] extras = 'eyes.ply' should be a list of files"),
+        ("extras = [1]\n", r"\[target\] extras = \[1\] should be a list of files"),
         ("bases = 3\n", "not TOML|should be a table"),
     ],
 )

@@ -7,13 +7,14 @@ from toolkit.rendering.camera import Camera
 from toolkit.rendering.colormap import ColorScale, add_legend
 from toolkit.rendering.overlay import Lines, Markers
 from toolkit.rendering.renderer import Renderer
-from toolkit.rendering.shading import BONE, CLAY, SKIN, Lighting, Material
+from toolkit.rendering.shading import BONE, CLAY, IVORY, SKIN, Lighting, Material
 from toolkit.rendering.sheet import Row, contact_sheet, side_by_side
 from toolkit.rendering.video import write_video
 
 __all__ = [
     "BONE",
     "CLAY",
+    "IVORY",
     "SKIN",
     "Camera",
     "ColorScale",

@@ -31,14 +31,22 @@ class Renderer:
     ----------
     triangles : (F, 3) vertex ids, counter-clockwise seen from outside. Back faces are drawn, darker.
     material, lighting : how the surface looks; lights travel with the camera.
+    albedo : (V, 3) linear RGB of every vertex in place of the material's, for meshes of several materials
     """
 
-    def __init__(self, triangles: ArrayLike, material: Material = CLAY, lighting: Lighting | None = None) -> None:
+    def __init__(
+        self,
+        triangles: ArrayLike,
+        material: Material = CLAY,
+        lighting: Lighting | None = None,
+        albedo: NDArray[np.floating] | None = None,
+    ) -> None:
         self.triangles = np.ascontiguousarray(triangles, dtype=np.int32)
         if self.triangles.ndim != 2 or self.triangles.shape[1] != 3 or len(self.triangles) == 0:
             raise InputError(f"a renderer needs triangles of shape (F, 3), got {self.triangles.shape}")
         self.material = material
         self.lighting = lighting or Lighting()
+        self._albedos = albedo
         self._n_needed = int(self.triangles.max()) + 1
 
     def render(
@@ -102,6 +110,8 @@ class Renderer:
         return points
 
     def _albedo(self, points: Array, colors: ArrayLike | None) -> Array:
+        if colors is None and self._albedos is not None and len(self._albedos) == len(points):
+            return np.ascontiguousarray(self._albedos, dtype=np.float64)
         if colors is None:
             return np.tile(np.array(self.material.albedo), (len(points), 1))
         albedo = linear_rgb(colors)

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["BONE", "CLAY", "SKIN", "Lighting", "Material", "encode_pixels", "encode_srgb", "linear_rgb"]
+__all__ = ["BONE", "CLAY", "IVORY", "SKIN", "Lighting", "Material", "encode_pixels", "encode_srgb", "linear_rgb"]
 
 Vector = tuple[float, float, float]
 
@@ -29,6 +29,7 @@ class Material:
 
 CLAY = Material((0.47, 0.435, 0.40))
 SKIN = Material((0.55, 0.40, 0.325), wrap=(0.12, 0.06, 0.04))
+IVORY = Material((0.62, 0.60, 0.57), gloss=0.3, sharpness=60.0, wrap=(0.05, 0.05, 0.05))
 BONE = Material((0.405, 0.42, 0.45), wrap=(0.05, 0.05, 0.05))
 
 

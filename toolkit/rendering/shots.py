@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.meshio import FrameSequence
+from toolkit.rendering.extras import load_extras
 from toolkit.rendering.regions import face_vertices
 from toolkit.rendering.shading import BONE, SKIN
 from toolkit.rendering.takes import View, choose_frames
@@ -59,6 +60,8 @@ def open_views(shot: Shot, *, forward: Vector = (0.0, 0.0, 1.0), up: Vector = (0
     focus = face_vertices(source.vertices, landmarks)
     shown = source.vertices if focus is None else source.vertices[focus]
     height = float(np.ptp(shown @ np.asarray(up) / np.linalg.norm(up)))
+    motion = load_motion(shot)
+    motions = (motion, motion.seen_from(pose))
     performance = View(
         "source",
         source.triangles,
@@ -69,6 +72,7 @@ def open_views(shot: Shot, *, forward: Vector = (0.0, 0.0, 1.0), up: Vector = (0
         forward,
         up,
         focus,
+        load_extras(shot.config.source.extras, motions[0]),
     )
     retargeted = replace(
         performance,
@@ -78,10 +82,9 @@ def open_views(shot: Shot, *, forward: Vector = (0.0, 0.0, 1.0), up: Vector = (0
         material=BONE,
         forward=_turned(pose, forward),
         up=_turned(pose, up),
+        extras=load_extras(shot.config.target.extras, motions[1]),
     )
     heights = (height, height * pose.scale)
-    motion = load_motion(shot)
-    motions = (motion, motion.seen_from(pose))
     return ShotViews(performance, retargeted, landmarks, float(sequence.fps or 30.0), heights, motions)
 
 
@@ -112,7 +115,8 @@ def _held_still(view: View, motion: HeadMotion) -> View:
     def frame(index: int) -> NDArray[np.floating]:
         return np.asarray((view.frame(index) - motion.translations[index]) @ motion.rotations[index])
 
-    return replace(view, frame=frame)
+    extras = view.extras and replace(view.extras, motion=HeadMotion.none(view.n_frames))
+    return replace(view, frame=frame, extras=extras)
 
 
 def _turned(pose: Similarity, direction: Vector) -> Vector:

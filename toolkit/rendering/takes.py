@@ -14,6 +14,7 @@ from toolkit.blocks import worker_count
 from toolkit.errors import InputError
 from toolkit.progress import Progress, silent
 from toolkit.rendering.camera import Camera
+from toolkit.rendering.extras import Extras
 from toolkit.rendering.renderer import Renderer
 from toolkit.rendering.shading import CLAY, Material
 from toolkit.rendering.sheet import Row, contact_sheet, side_by_side
@@ -31,7 +32,7 @@ class View:
     ``label`` for its row, ``triangles`` (F, 3), ``rest`` (V, 3) which the camera is fixed on, ``n_frames``,
     ``frame`` reads the positions (V, 3) of one frame and may be called from several threads, ``forward`` from the face
     to its viewer and ``up`` in its frame of reference, ``focus`` (N,) the vertices that the camera frames, all by
-    default.
+    default; ``extras`` are drawn beside the skin.
     """
 
     label: str
@@ -43,6 +44,21 @@ class View:
     forward: tuple[float, float, float] = (0.0, 0.0, 1.0)
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     focus: NDArray[np.integer] | None = None
+    extras: Extras | None = None
+
+    def renderer(self) -> Renderer:
+        """Draws what `drawn` returns."""
+        if self.extras is None:
+            return Renderer(self.triangles, self.material)
+        triangles = np.concatenate([self.triangles, self.extras.triangles + len(self.rest)])
+        shares = [(self.material, len(self.rest)), (self.extras.material, len(self.extras.rest))]
+        albedo = np.concatenate([np.tile(material.albedo, (count, 1)) for material, count in shares])
+        return Renderer(triangles, self.material, albedo=albedo)
+
+    def drawn(self, index: int) -> NDArray[np.floating]:
+        """Positions of the skin and of what is drawn beside it in one frame."""
+        skin = self.frame(index)
+        return skin if self.extras is None else np.concatenate([skin, self.extras.frame(index)])
 
     def camera(
         self, aspect: float, *, turn: float = 0.0, only: NDArray[np.integer] | None = None, margin: float = 0.08
@@ -84,10 +100,10 @@ def pictures_of(
     workers: int | None = None,
 ) -> Iterator[Image]:
     """Render ``frames`` one after another on threads, in order; only a few pictures are held at a time."""
-    renderer = Renderer(view.triangles, view.material)
+    renderer = view.renderer()
 
     def draw(index: int) -> Image:
-        return renderer.render(view.frame(index), camera, size, supersample=supersample)
+        return renderer.render(view.drawn(index), camera, size, supersample=supersample)
 
     count = workers or worker_count()
     with ThreadPoolExecutor(count) as pool:

@@ -28,18 +28,23 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class SourceInput:
-    """The performance: ``reference`` mesh, ``frames`` (folder or file), ``fps`` if the frames do not say it."""
+    """The performance: ``reference`` mesh, ``frames`` (folder or file), ``fps`` if the frames do not say it.
+
+    ``extras`` are meshes for the pictures only, eyeballs for one: they ride stiffly with the head.
+    """
 
     reference: Path
     frames: Path
     fps: float | None = None
+    extras: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)
 class TargetInput:
-    """The face that it goes to: its ``reference`` mesh, of any topology."""
+    """The face that it goes to: its ``reference`` mesh, of any topology, and ``extras`` for the pictures."""
 
     reference: Path
+    extras: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -84,13 +89,16 @@ def load_config(path: Path) -> ShotConfig:
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"this is not TOML ({error})", where=path, remedy="mend that line") from None
     _known(data, ["source", "target", *_STAGES], "table", path)
-    source = _inputs(data, "source", {"reference": str, "frames": str, "fps": float}, ["reference", "frames"], path)
-    target = _inputs(data, "target", {"reference": str}, ["reference"], path)
+    kinds = {"reference": str, "frames": str, "fps": float, "extras": list}
+    source = _inputs(data, "source", kinds, ["reference", "frames"], path)
+    target = _inputs(data, "target", {"reference": str, "extras": list}, ["reference"], path)
     folder = path.parent
     stages: dict[str, Any] = {name: _table(kind, data.get(name, {}), name, path) for name, kind in _STAGES.items()}
     return ShotConfig(
-        SourceInput(folder / source["reference"], folder / source["frames"], source.get("fps")),
-        TargetInput(folder / target["reference"]),
+        SourceInput(
+            folder / source["reference"], folder / source["frames"], source.get("fps"), _extras(source, folder)
+        ),
+        TargetInput(folder / target["reference"], _extras(target, folder)),
         **stages,
     )
 
@@ -101,7 +109,8 @@ def save_config(path: Path, config: ShotConfig) -> None:
     lines += [f"reference = {_toml(str(config.source.reference))}", f"frames = {_toml(str(config.source.frames))}"]
     if config.source.fps is not None:
         lines.append(f"fps = {_toml(float(config.source.fps))}")
-    lines += ["", "[target]", f"reference = {_toml(str(config.target.reference))}"]
+    lines.append(_extras_line(config.source.extras))
+    lines += ["", "[target]", f"reference = {_toml(str(config.target.reference))}", _extras_line(config.target.extras)]
     for name, kind in _STAGES.items():
         lines += ["", f"[{name}]"]
         given, default = asdict(getattr(config, name)), asdict(kind())
@@ -111,6 +120,16 @@ def save_config(path: Path, config: ShotConfig) -> None:
             lines.append(f"{comment}{_spelled(key)} ={shown}")
     with written_aside(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _extras(table: dict[str, Any], folder: Path) -> tuple[Path, ...]:
+    return tuple(folder / name for name in table.get("extras", []))
+
+
+def _extras_line(paths: tuple[Path, ...]) -> str:
+    if not paths:
+        return '# extras = ["eyes.ply"]  # meshes for the pictures only, which ride with the head'
+    return f"extras = [{', '.join(_toml(str(path)) for path in paths)}]"
 
 
 def _inputs(data: dict[str, Any], name: str, kinds: dict[str, type], needed: list[str], path: Path) -> dict[str, Any]:
@@ -145,6 +164,8 @@ def _table(kind: type[T], table: Any, name: str, path: Path) -> T:
 def _typed(value: Any, kind: type, what: str, path: Path) -> Any:
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
+    if kind is list and not (isinstance(value, list) and all(isinstance(item, str) for item in value)):
+        raise InputError(f"{what} = {value!r} should be a list of files", where=path, remedy='write ["eyes.ply"]')
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
         raise InputError(f"{what} = {value!r} should be a {kind.__name__}", where=path, remedy="mend the value")
     return value

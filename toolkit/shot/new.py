@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from toolkit.errors import InputError
@@ -19,6 +20,8 @@ def create_shot(
     *,
     landmarks: Path | None = None,
     feature_lines: Path | None = None,
+    source_extras: Sequence[Path] = (),
+    target_extras: Sequence[Path] = (),
     fps: float | None = None,
     force: bool = False,
 ) -> None:
@@ -29,11 +32,16 @@ def create_shot(
     toml = folder / "shot.toml"
     if toml.exists() and not force:
         raise InputError("the shot exists already", where=toml, remedy="edit it, or give --force to write it anew")
-    inputs = {"the source reference": source_reference, "the frames": frames, "the target": target}
-    for what, path in inputs.items():
+    inputs = [("the source reference", source_reference), ("the frames", frames), ("the target", target)]
+    inputs += [("the extras", path) for path in (*source_extras, *target_extras)]
+    for what, path in inputs:
         if not path.exists():
             raise InputError(f"there is no such file for {what}", where=path, remedy="check the path")
-    config = ShotConfig(SourceInput(source_reference.resolve(), frames.resolve(), fps), TargetInput(target.resolve()))
+    beside = [tuple(path.resolve() for path in extras) for extras in (source_extras, target_extras)]
+    config = ShotConfig(
+        SourceInput(source_reference.resolve(), frames.resolve(), fps, beside[0]),
+        TargetInput(target.resolve(), beside[1]),
+    )
     for name, picks in {"landmarks.json": landmarks, "feature_lines.json": feature_lines}.items():
         if picks is not None:
             _copy(picks, folder / name)
