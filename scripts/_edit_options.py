@@ -261,7 +261,7 @@ _HELP = {
     "lambda_b": "weight of the change of the bases (1)",
     "lambda_w": "weight of the change of the curves' motion (10)",
     "lambda_e": "weight of what is asked (10000)",
-    "handle": "radius of the disc that a pull takes hold of, as a share of the face's diagonal (0.015)",
+    "handle": "radius of the disc that a pull takes hold of, as a share of the face's diagonal (0.03)",
     "reach": "how far a pull carries over the surface, as a share of the same (0.1); 0 is no limit",
     "smoothness": "frames below which the curves prefer to bend slowly (5)",
     "tolerance": "the rounds end when one gains less than this share (0.05)",

@@ -44,7 +44,7 @@ class EditParameters:
     lambda_b: float = 1.0
     lambda_w: float = 10.0
     lambda_e: float = 10000.0
-    handle: float = 0.015
+    handle: float = 0.03
     reach: float = 0.1
     smoothness: float = 5.0
     coupled: bool = True

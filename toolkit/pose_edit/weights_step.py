@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.linalg import cholesky_banded
 
 __all__ = ["FrameRows", "WeightsProblem", "time_matrix"]
 
@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 _MOST_STEPS = 60
 _MOST_CORRECTIONS = 2
+# A gain, as a share of the energy, that is not worth a solve with bounds.
+_NOTHING = 1e-3
 # Complementarity, as a share of its start, at which the interior point stops.
 _CLOSE = 1e-9
 # How far inside the bounds the interior point begins; weights are of order 1.
@@ -84,8 +86,19 @@ class WeightsProblem:
         return force if self.gram is None else force + change @ self.gram
 
     def solve(self, rows: FrameRows, goals: Array, metric: Array, start: Array) -> Array:
-        """The best change (n, K) for goals ``r`` (R,) and metric ``M`` (R, R), beginning near ``start`` (n, K)."""
+        """The best change (n, K) for goals ``r`` (R,) and metric ``M`` (R, R), beginning near ``start`` (n, K).
+
+        The solution without bounds comes first: it often keeps to them, and it tells how much there is to gain. Where
+        that is next to nothing, as with most of the face held, ``start`` is returned as it is.
+        """
         gradient = _Gradient(self, rows, goals, metric)
+        nothing = np.zeros_like(start)
+        free = gradient.factorise(nothing).solve(-gradient(nothing))
+        if (free >= self.lower).all():
+            return free
+        now = gradient.energy(start)
+        if now - gradient.energy(free) <= _NOTHING * now:
+            return start
         change, force = self._interior_point(gradient, start)
         pulled = float(np.abs(gradient(np.zeros_like(start))).max())
         active = change - self.lower < force / max(pulled, 1e-300)
@@ -172,40 +185,51 @@ class _System:
             _factorise_chains(bands)
             self._factor = bands
         else:
-            self._factor = cholesky_banded(bands, overwrite_ab=True, lower=True, check_finite=False)
-        self._small = metric + self._answers()
+            factor = cholesky_banded(bands, overwrite_ab=True, lower=True, check_finite=False)
+            self._factor = np.ascontiguousarray(factor.T)
+        if self._by_basis:
+            self._small = metric + self._answers()
+        else:
+            self._halves = self._half_answers()
+            self._small = metric + self._halves.T @ self._halves
 
     def solve(self, right: Array) -> Array:
         """Solve for one right-hand side (n, K); what cannot move stays zero."""
-        alone = self._banded(np.where(self._open, right, 0.0))
-        pull = _solved(self._small, self._rows.of(alone))
-        return alone - self._banded(self._rows.spread(pull, alone))
+        masked = np.where(self._open, right, 0.0)
+        if self._by_basis:
+            alone = self._chains(masked)
+            pull = _solved(self._small, self._rows.of(alone))
+            return alone - self._chains(self._rows.spread(pull, alone))
+        half = np.array(masked.reshape(-1, 1))
+        _forward(self._factor, half, 0)
+        half[:, 0] -= self._halves @ _solved(self._small, self._halves.T @ half[:, 0])
+        _backward(self._factor, half)
+        return half.reshape(self._shape)
 
     def _answers(self) -> Array:
-        """``B P^-1 B^T`` (R, R)."""
+        """``B P^-1 B^T`` (R, R), basis by basis."""
         rows, (n, n_bases) = self._rows, self._shape
-        if self._by_basis:
-            frames, at = np.unique(rows.frames, return_inverse=True)
-            units = np.zeros((n_bases, n, len(frames)))
-            units[:, frames, np.arange(len(frames))] = 1
-            solved = self._substitute(units.reshape(-1, len(frames)))
-            between = solved.reshape(n_bases, n, -1)[:, frames][:, at][:, :, at]  # (K, R, R)
-            return np.asarray(np.einsum("ak,kab,bk->ab", rows.local, between, rows.local))
+        frames, at = np.unique(rows.frames, return_inverse=True)
+        units = np.zeros((n_bases, n, len(frames)))
+        units[:, frames, np.arange(len(frames))] = 1
+        solved = units.reshape(-1, len(frames))
+        _substitute_chains(self._factor, solved)
+        between = solved.reshape(n_bases, n, -1)[:, frames][:, at][:, :, at]  # (K, R, R)
+        return np.asarray(np.einsum("ak,kab,bk->ab", rows.local, between, rows.local))
+
+    def _half_answers(self) -> Array:
+        """``L^-1 B^T`` (n K, R), with ``P = L L^T``: half the way to ``B P^-1 B^T``, and all that is needed."""
+        rows, (n, n_bases) = self._rows, self._shape
         pulls = np.zeros((n, n_bases, len(rows.frames)))
         pulls[rows.frames, :, np.arange(len(rows.frames))] = rows.local
-        solved = self._substitute(pulls.reshape(n * n_bases, -1))
-        return np.asarray(np.einsum("ak,akb->ab", rows.local, solved.reshape(n, n_bases, -1)[rows.frames]))
+        halves = pulls.reshape(n * n_bases, -1)
+        _forward(self._factor, halves, int(rows.frames.min(initial=0)) * n_bases)
+        return halves
 
-    def _banded(self, right: Array) -> Array:
-        solved = self._substitute(self._flat(right)[:, None])
-        return np.asarray(solved.reshape(self._shape[::-1]).T if self._by_basis else solved.reshape(self._shape))
-
-    def _substitute(self, columns: Array) -> Array:
-        if not self._by_basis:
-            return np.asarray(cho_solve_banded((self._factor, True), columns, check_finite=False))
-        solved = np.array(columns, order="C")
+    def _chains(self, right: Array) -> Array:
+        solved = np.array(self._flat(right)[:, None], order="C")
         _substitute_chains(self._factor, solved)
-        return solved
+        return np.asarray(solved.reshape(self._shape[::-1]).T)
 
     def _flat(self, array: NDArray) -> NDArray:
         return array.T.ravel() if self._by_basis else array.ravel()
@@ -261,6 +285,32 @@ def _substitute_chains(factor, columns):  # type: ignore[no-untyped-def]  # comp
                 columns[i, c] -= first[i] * columns[i + 1, c]
             if i + 2 < n:
                 columns[i, c] -= second[i] * columns[i + 2, c]
+
+
+@njit(cache=True, nogil=True)
+def _forward(factor, columns, first):  # type: ignore[no-untyped-def]  # compiled
+    """``L^-1 columns`` (N, C) in place, from row ``first`` on; ``factor`` (N, W) holds L's columns, diagonal first."""
+    n, width = factor.shape
+    count = columns.shape[1]
+    for i in range(first, n):
+        for c in range(count):
+            columns[i, c] /= factor[i, 0]
+        for j in range(1, min(width, n - i)):
+            for c in range(count):
+                columns[i + j, c] -= factor[i, j] * columns[i, c]
+
+
+@njit(cache=True, nogil=True)
+def _backward(factor, columns):  # type: ignore[no-untyped-def]  # compiled
+    """``L^-T columns`` (N, C) in place."""
+    n, width = factor.shape
+    count = columns.shape[1]
+    for i in range(n - 1, -1, -1):
+        for j in range(1, min(width, n - i)):
+            for c in range(count):
+                columns[i, c] -= factor[i, j] * columns[i + j, c]
+        for c in range(count):
+            columns[i, c] /= factor[i, 0]
 
 
 def _solved(matrix: Array, right: Array) -> Array:
