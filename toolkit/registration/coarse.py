@@ -9,8 +9,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from toolkit.mesh import TriangleMesh
+from toolkit.operators import uniform_laplacian
+from toolkit.solve import factorise
 
-__all__ = ["Coarse", "closest_on_triangles", "decimate"]
+__all__ = ["Coarse", "Gather", "closest_on_triangles", "decimate"]
 
 Array = NDArray[np.float64]
 
@@ -40,6 +42,30 @@ def decimate(mesh: TriangleMesh, n_vertices: int) -> Coarse:
     vertices, triangles, landed = fast_simplification.replay_simplification(mesh.vertices, mesh.triangles, collapses)
     coarse = TriangleMesh(np.asarray(vertices, dtype=np.float64), np.asarray(triangles, dtype=np.int32))
     return Coarse(coarse, _barycentric_rows(mesh.vertices, coarse, np.asarray(landed, dtype=np.int64)))
+
+
+class Gather:
+    """From fine to coarse: least-squares positions and averages, the counterpart of ``Coarse.prolong``."""
+
+    def __init__(self, coarse: Coarse) -> None:
+        self._prolong = coarse.prolong
+        n = coarse.mesh.n_vertices
+        laplacian = uniform_laplacian(coarse.mesh.triangles, n)
+        normal = coarse.prolong.T @ coarse.prolong + 1e-4 * (laplacian.T @ laplacian) + 1e-9 * sp.identity(n)
+        self._factor = factorise(sp.csc_matrix(normal))
+        self._weight = np.maximum(np.asarray(coarse.prolong.sum(axis=0)).ravel(), 1e-12)
+
+    def fit(self, fine: Array) -> Array:
+        """Coarse positions ``(C, 3)`` whose prolongation is nearest to ``fine`` (V, 3)."""
+        return self._factor.solve(self._prolong.T @ fine)
+
+    def share(self, mask: NDArray) -> Array:
+        """Weighted mean ``(C,)`` of a fine quantity round each coarse vertex."""
+        return np.asarray(self._prolong.T @ mask.astype(float)) / self._weight
+
+    def vote(self, labels: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Label ``(C,)`` of most of the fine vertices round each coarse one, 0 where they are divided."""
+        return np.round(self.share(labels)).astype(np.int8)
 
 
 def _barycentric_rows(points: Array, coarse: TriangleMesh, landed: NDArray[np.int64]) -> sp.csr_matrix:

@@ -1,0 +1,50 @@
+"""From a prepared pair of faces to positions: one after the other what the other modules do."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolkit.mesh import connected_components
+from toolkit.progress import Progress
+from toolkit.registration.coarse import Coarse, Gather, decimate
+from toolkit.registration.finish import follow, project, smooth_field, unfold
+from toolkit.registration.nonrigid import solve_field
+from toolkit.registration.parameters import RegistrationParameters
+from toolkit.registration.prepare import Job
+
+__all__ = ["fit"]
+
+Array = NDArray[np.float64]
+
+
+def fit(job: Job, parameters: RegistrationParameters, progress: Progress) -> Array:
+    """Positions ``(V, 3)`` of the source's vertices on the target: field, projection, unfolding, followers."""
+    coarse = decimate(job.source.with_vertices(job.posed), parameters.resolution)
+    gather = Gather(coarse)
+    # The coarse vertices as combinations of fine ones, so that positions and labels go both ways.
+    mesh = coarse.mesh.with_vertices(gather.fit(job.posed))
+    coarse = Coarse(mesh, coarse.prolong)
+    reference = 0.5 * job.alike * (gather.fit(job.similarity.apply(job.source.vertices)) - mesh.vertices)
+    labels = {name: gather.vote(values) for name, values in job.labels.items()}
+    field = solve_field(
+        coarse,
+        job.posed,
+        reference,
+        gather.share(job.skin) > 0.5,
+        job.surface,
+        labels,
+        (job.ids, job.points),
+        job.curves,
+        job.extent,
+        parameters,
+        progress,
+    )
+    moved = job.posed + smooth_field(job.source.triangles, coarse.prolong @ field)
+    if parameters.project:
+        rims = [curve for curve in job.curves if curve.opening]
+        near = job.source.with_vertices(moved)
+        moved = project(near, job.skin, job.surface, job.labels, rims, job.extent, parameters)
+    moved = unfold(job.source.with_vertices(job.posed), moved, job.skin)
+    _, parts = connected_components(job.source.triangles, job.source.n_vertices)
+    return follow(job.source, job.posed, moved, job.skin, parts)
