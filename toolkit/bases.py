@@ -6,7 +6,6 @@ origin is. The candidates are the frames themselves. Everything after the Gram m
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg.blas import dsyrk, ssyrk
 
+from toolkit.blocks import map_blocks
 from toolkit.errors import InputError
 from toolkit.progress import Progress, silent
 from toolkit.steadying import steady_weights
@@ -77,13 +77,17 @@ class BasisSelection:
 def gram_matrix(deltas: NDArray[np.floating], progress: Progress = silent) -> Array:
     """``G = X X^T`` of the frames' deltas ``(T, V, 3)``, ``(T, T)``; possibly memory-mapped, read in columns."""
     flat = deltas.reshape(len(deltas), -1)
-    total = np.zeros((len(flat), len(flat)))
-    for start, stop in _chunks(flat.shape[1], _CHUNK_COLUMNS):
+    products = {}
+
+    def work(start: int, stop: int) -> None:
         columns = np.ascontiguousarray(flat[:, start:stop])
         # Half of the product, its other half being the same; in single precision inside a chunk, double over chunks.
-        product = (ssyrk if columns.dtype == np.float32 else dsyrk)(1.0, columns.T, trans=1, lower=1)
-        total += product
-        progress("comparing frames", stop, flat.shape[1])
+        products[start] = (ssyrk if columns.dtype == np.float32 else dsyrk)(1.0, columns.T, trans=1, lower=1)
+
+    map_blocks(work, flat.shape[1], _CHUNK_COLUMNS, what="comparing frames", progress=progress)
+    total = np.zeros((len(flat), len(flat)))
+    for start in sorted(products):  # always in this order, whichever was done first
+        total += products[start]
     return np.tril(total) + np.tril(total, -1).T
 
 
@@ -290,8 +294,3 @@ def _active_sets(inner, coupling, start):  # type: ignore[no-untyped-def]  # com
         for k in range(n_bases):
             w[k] = max(w[k], 0.0)
     return result
-
-
-def _chunks(total: int, size: int) -> Iterator[tuple[int, int]]:
-    for start in range(0, total, size):
-        yield start, min(start + size, total)

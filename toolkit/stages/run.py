@@ -8,6 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from toolkit.blocks import map_blocks
 from toolkit.errors import InputError
 from toolkit.progress import Progress, silent
@@ -136,7 +138,8 @@ def _run(shot: Shot, stage: Stage, force: bool, progress: Progress, map_blocks: 
         return StageReport(stage.name, True, 0.0, manifest.get("numbers", {}))
     log.info("%s: running", stage.name)
     began = time.perf_counter()
-    with shot.write_stage(stage.name, key, stage_parameters(shot, stage.name)) as folder:
+    # Threads of BLAS wait by spinning: on products as small as most are here they only take time from others.
+    with threadpool_limits(1), shot.write_stage(stage.name, key, stage_parameters(shot, stage.name)) as folder:
         stage.work(shot, folder, progress, **({"map_blocks": map_blocks} if stage.by_frames else {}))
     seconds = time.perf_counter() - began
     log.info("%s: done in %.1f s", stage.name, seconds)
