@@ -5,6 +5,7 @@ import pytest
 
 from data.heads import HEADS, SHAPES, build_head, eyeballs
 from data.layout import LEVELS
+from data.remeshing import split_quads
 from data.rims import to_curve
 
 
@@ -63,3 +64,20 @@ def test_the_eyeballs_sit_behind_the_lids(package, layout):
     left = eyes[eyes[:, 0] > 0]
     assert triangles.max() == len(eyes) - 1
     assert np.linalg.norm(left.mean(0)[:2] - head.neutral[layout.loops["eyelid_rim_left"]].mean(0)[:2]) < 0.6
+
+
+@pytest.mark.parametrize("name", ["male_young", "asian_female", "hound"])
+def test_closed_lids_cover_the_eyeballs(package, layout, name):
+    import open3d as o3d
+
+    head = build_head(package, name)
+    eyes, _ = eyeballs(package, head.eyes)
+    closed = head.shape(_weights(eyeBlinkLeft=1, eyeBlinkRight=1))
+    shut = (layout.subdivision.matrix @ closed).astype(np.float32)
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(shut, split_quads(layout.quads(LEVELS)).astype(np.uint32))
+    middle = eyes[:, 2].mean()
+    front = eyes[eyes[:, 2] > middle + 0.3 * (eyes[:, 2].max() - middle)]
+    rays = np.column_stack([front, np.tile([0.0, 0, 1], (len(front), 1))]).astype(np.float32)
+    assert len(front) > 500
+    assert np.isfinite(scene.cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy()).all()
