@@ -131,6 +131,16 @@ class App:
             known = self._surfaces[name] = (key, self._make_surface(name))
         return known[1]
 
+    def extras(self, pane: int) -> tuple[NDArray[np.float32], NDArray[np.int32]] | None:
+        """What belongs beside the face in a pane, eyeballs for one: positions (N, 3) and triangles (F, 3)."""
+        name = self.pair.right if pane else self.pair.left
+        extras = self.data.source_extras if name.startswith("source") else self.data.target_extras
+        if extras is None:
+            return None
+        still = "reference" in name or name == "registered"
+        places = extras.rest if still else extras.frame(self.play.frame)
+        return places.astype(np.float32), extras.triangles
+
     def edges(self, pane: int) -> NDArray[np.int32]:
         """The edges of a pane's mesh ``(E, 2)``, without the diagonals of its quads."""
         mesh = self.data.source if self.surface(pane).mesh == "source" else self.data.target
@@ -153,7 +163,8 @@ class App:
         if field is not None:
             base = field.colors()
         else:
-            base = np.array([CLAY if "reference" in surface.name or surface.name == "registered" else SKIN], np.float32)
+            still = "reference" in surface.name or surface.name == "registered"
+            base = look.skin_of(self, surface, CLAY if still else SKIN)
         tint = self.mode.tint(pane)
         return _blended(base, tint, len(surface.vertices)) if tint is not None else base
 
@@ -392,7 +403,7 @@ class App:
         if event.kind == "wheel":
             if self.mode.wheel(event):
                 return
-            self.set_view(event.pane, self._view_of(event.pane).zoomed(event.wheel))
+            self.set_view(event.pane, self._view_of(event.pane).zoomed(event.wheel, self._under(event)))
         elif event.kind == "hover":
             self.mode.hover(event)
         elif event.kind == "press":
@@ -423,6 +434,15 @@ class App:
                 elevation=float(np.clip(turned[1], -89, 89)),
             )
             self.touch("faces", "panel")
+
+    def _under(self, event: Pointer) -> NDArray[np.float64]:
+        """What the pointer is over, in the plane through what is looked at: from the face's centre, in its heights."""
+        framing, camera = self.surface(event.pane).framing, self.framing_camera(event.pane)
+        toward = camera.axes()[2]
+        origin, direction = np.asarray(event.origin), np.asarray(event.direction)
+        reach = float((np.asarray(camera.target) - origin) @ toward) / min(float(direction @ toward), -1e-6)
+        place = origin + reach * direction
+        return np.asarray((place - np.asarray(framing.centre)) @ np.asarray(framing.axes).T / framing.height)
 
     def _view_of(self, pane: int) -> Viewpoint:
         return self.views[0 if self.linked else pane]

@@ -80,11 +80,14 @@ class Viewpoint:
         above = np.cross(toward, side)
         return replace(self, shift=_triple(np.asarray(self.shift) - across * (right * side + up * above)))
 
-    def zoomed(self, notches: float) -> Viewpoint:
-        """Closer by some notches of the wheel."""
-        return replace(
-            self, distance=float(np.clip(self.distance * 0.9 ** np.clip(notches, -99, 99), _NEAREST, _FARTHEST))
-        )
+    def zoomed(self, notches: float, about: ArrayLike | None = None) -> Viewpoint:
+        """Closer by some notches of the wheel; ``about`` (3,), as ``shift`` is, keeps its place in the picture."""
+        asked = self.distance * 0.9 ** float(np.clip(notches, -99, 99))
+        distance = float(np.clip(asked, _NEAREST, _FARTHEST))
+        if about is None:
+            return replace(self, distance=distance)
+        kept, share = np.asarray(about, dtype=np.float64), distance / self.distance
+        return replace(self, distance=distance, shift=_triple(kept + share * (np.asarray(self.shift) - kept)))
 
     def _toward(self) -> Array:
         a, e = np.radians([self.azimuth, self.elevation])

@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+
 from viewer.state import rows as kinds
 from viewer.state.events import PanelInput
 from viewer.state.rows import Row
@@ -168,15 +170,17 @@ class Panel:
 
     def _slider(self, row: kinds.Slider, column: Any) -> Callable[[Any], None]:
         widget = gui.Slider(gui.Slider.DOUBLE)
-        widget.set_limits(row.low, row.high)
+        # Also while it is moved: without a value it would be at its low end, and say so.
+        widget.set_limits(_single(row.low), _single(row.high))
+        widget.double_value = _single(row.value)
         widget.set_on_value_changed(lambda value: self._sent(row.name, float(value), False))
         self._line(column, row.text, widget)
         self.named[row.name] = widget
 
         def update(new: kinds.Slider) -> None:
             if new.name not in self._moving:  # never against the user's hand
-                widget.set_limits(new.low, new.high)
-                widget.double_value = new.value
+                widget.set_limits(_single(new.low), _single(new.high))
+                widget.double_value = _single(new.value)
 
         return update
 
@@ -237,6 +241,11 @@ class Panel:
 
     def _wrapped(self, text: str) -> str:
         return "\n".join(textwrap.fill(part, self._letters) for part in text.splitlines()) if text else " "
+
+
+def _single(value: float) -> float:
+    """A value that a slider can hold: it draws in single precision, and calls back where that changes the value."""
+    return float(np.float32(value))
 
 
 def _shape(row: Row) -> tuple[Any, ...]:

@@ -339,3 +339,16 @@ def test_a_draft_goes_through_its_data_and_keeps_what_has_no_gesture() -> None:
     assert PoseDraft.from_data(plain) == draft
     assert set(draft.data()) == {"constraints", "parameters", "note"}
     assert PoseDraft.from_data(json.loads(json.dumps(draft.data())), 12) == draft
+
+
+def test_the_wheel_zooms_to_what_the_pointer_is_over(hand) -> None:
+    app = hand.app
+    at = hand.pixel_of(MIDDLE + 40)
+    event = hand.event("wheel", *at, wheel=6.0)
+    middle = np.asarray(app.framing_camera(1).target)
+    toward = app.framing_camera(1).axes()[2]
+    origin, direction = np.asarray(event.origin), np.asarray(event.direction)
+    under = origin + (middle - origin) @ toward / (direction @ toward) * direction
+    app.handle(event)
+    assert app.views[1].distance < 2
+    assert app.pixel(1, under) == pytest.approx(at, abs=0.1)

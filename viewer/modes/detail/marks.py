@@ -20,7 +20,7 @@ __all__ = ["detail_marks", "detail_tint"]
 
 _REGION = np.array([1.0, 0.62, 0.10], np.float32)
 _GOAL = np.array([0.20, 0.85, 0.45], np.float32)
-_SHARE = 0.42
+_SHARE, _SHARE_ON_MAP = 0.42, 0.2
 
 
 def detail_tint(mode: DetailEditMode, pane: int) -> Tint | None:
@@ -31,15 +31,16 @@ def detail_tint(mode: DetailEditMode, pane: int) -> Tint | None:
     count = len(mode.app.surface(pane).vertices)
     share = np.zeros(count, np.float32)
     colors = np.broadcast_to(_REGION, (count, 3)).copy()
+    strength = _SHARE if mode.app.field(pane) is None else _SHARE_ON_MAP
     if draft.action in ("paste", "reshape") and mode.change is not None and not draft.empty:
         goal = mode.change.region
-        share[goal.vertices] = _SHARE * goal.weights
+        share[goal.vertices] = strength * goal.weights
         colors[goal.vertices] = _GOAL
     if draft.region is not None and len(draft.region) and not (draft.action == "gain" and draft.everywhere):
         region = draft.region
-        stronger = _SHARE * region.weights >= share[region.vertices]
+        stronger = strength * region.weights >= share[region.vertices]
         ids = region.vertices[stronger]
-        share[ids] = _SHARE * region.weights[stronger]
+        share[ids] = strength * region.weights[stronger]
         colors[ids] = _REGION
     return colors, share
 

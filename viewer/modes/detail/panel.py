@@ -186,7 +186,7 @@ def _scale_rows(mode: DetailEditMode, draft: DetailDraft) -> list[Row]:
 
 def _paste_rows(mode: DetailEditMode, draft: DetailDraft) -> list[Row]:
     shown, source = mode.app.play.frame, draft.source_frame
-    words = f"copied from frame {source}" if source is not None else f"copied from the key frame, {draft.frame}"
+    words = f"copied from frame {source}" if source is not None else "copied from the key frame"
     return [
         Heading("The copy"),
         Slider("rotation", "turned, degrees", draft.rotation, -180.0, 180.0),
@@ -229,7 +229,8 @@ def _time_rows(mode: DetailEditMode, draft: DetailDraft) -> list[Row]:
     rows: list[Row] = [Heading("When"), Choice("details", "change", which, draft.details)]
     if draft.action != "gain" and draft.details == "dynamic":
         window = draft.window or (mode.change.window if mode.change is not None and not draft.empty else None)
-        words = f"key frame {draft.frame}"
+        frame = draft.frame if mode.draft is not None else mode.app.play.frame
+        words = f"key frame {frame}"
         if window is not None:
             words += f", acts in frames {window[0]} to {window[1]}"
         rows.append(Note(words, "quiet"))

@@ -48,6 +48,8 @@ def pose_tint(mode: PoseEdit, pane: int) -> Tint | None:
     draft = mode.draft
     if draft is None or (not draft.fixed and draft.beyond is None):
         return None
+    if mode.tool != "fix" and mode.app.field(pane) is not None:
+        return None  # the colour map is to be read
     share = np.zeros(len(mode.app.surface(pane).vertices), np.float32)
     share[list(draft.fixed)] = 0.55
     distance = mode.beyond.distance
