@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from toolkit.compiled import njit
 from toolkit.rendering import Camera
 
 __all__ = ["CLAY", "PLAIN", "SKIN", "Light", "bake", "directions"]
@@ -31,7 +31,7 @@ class Light:
 
     azimuth: float = -50.0
     elevation: float = 42.0
-    raking: float = 0.75
+    raking: float = 0.8
 
 
 def directions(light: Light, camera: Camera) -> Array:
@@ -60,7 +60,7 @@ def bake(
     """
     _normals(vertices, triangles, normals)
     towards = directions(light, camera)
-    strengths = np.array([light.raking, 0.22, 0.62 - 0.3 * light.raking, 0.10], dtype=np.float32)
+    strengths = np.array([1.1 * light.raking, 0.2, 0.5 - 0.3 * light.raking, 0.12], dtype=np.float32)
     eye = np.asarray(camera.position, dtype=np.float32)
     _light(vertices, normals, base, towards, strengths, eye, out)
 

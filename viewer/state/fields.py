@@ -19,6 +19,8 @@ MAPS: tuple[tuple[str, str], ...] = (
     ("distance", "registration distance"),
 )
 _STEPS = 512
+# A registration is only ever far off where the target ends.
+_PERCENTILE = {"difference": 99.9, "coating": 99.5, "distance": 97.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +41,10 @@ class Field:
 
 
 def scaled(name: str, values: NDArray[np.floating], unit: str) -> Field:
-    """A field of one of the maps, from zero to its 99th percentile, rounded so that the legend does not flicker."""
+    """A field of one of the maps, from zero to nearly its largest value, rounded, so that legends do not flicker."""
     label = dict(MAPS)[name]
     finite = values[np.isfinite(values)]
-    high = float(np.percentile(finite, 99.5)) if len(finite) else 0.0
+    high = float(np.percentile(finite, _PERCENTILE[name])) if len(finite) else 0.0
     cmap = {"difference": "magma", "coating": "viridis", "distance": "viridis"}[name]
     return Field(values, ColorScale(0.0, _round_up(high), label, unit, cmap))
 

@@ -5,18 +5,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.state.fields import MAPS, Field, scaled
-from viewer.state.panes import PAIRS
+from viewer.state.panes import PAIRS, Surface
 from viewer.state.rows import Button, Buttons, Choice, Heading, Note, Row, Slider
 from viewer.timeline import Timeline
 
 if TYPE_CHECKING:
     from viewer.state.app import App
 
-__all__ = ["field_of", "help_lines", "panel_rows", "sensible_map", "status_line", "timeline_of"]
+__all__ = ["field_of", "help_lines", "panel_rows", "sensible_map", "skin_of", "status_line", "timeline_of"]
 
 _MODES_IN_A_ROW = 4
+_INSIDE = 0.25
 
 
 def panel_rows(app: App) -> list[Row]:
@@ -158,6 +160,15 @@ def field_of(app: App, name: str) -> Field | None:
     if name == "coating":
         return app.coating_field(surface)
     return None
+
+
+def skin_of(app: App, surface: Surface, color: tuple[float, float, float]) -> NDArray[np.float32]:
+    """The colour of a face, ``(1, 3)``, or ``(V, 3)`` with the inside of mouth and eyes darker, once it is known."""
+    plain = np.array([color], np.float32)
+    inside = app.data.interior if surface.mesh == "source" else None
+    if inside is None or len(inside) != len(surface.vertices):
+        return plain
+    return np.where(inside[:, None], np.float32(_INSIDE) * plain, plain)
 
 
 def help_lines(app: App) -> list[tuple[str, str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,12 @@ from numpy.typing import NDArray
 from toolkit.errors import InputError
 from toolkit.mesh import TriangleMesh
 from toolkit.meshio import FrameSequence, open_sequence, read_mesh
+from toolkit.rendering.extras import Extras, load_extras
 from toolkit.rendering.shots import reader_of
 from toolkit.rigid import Similarity
 from toolkit.shot import Shot
+from toolkit.stabilisation import HeadMotion
+from toolkit.stages.decompose import load_motion
 from toolkit.stages.inputs import load_sequence
 from toolkit.stages.register import load_pose
 from viewer.state.cameras import Framing
@@ -93,6 +97,11 @@ class ShotData:
         return distance
 
     @cached_property
+    def interior(self) -> NDArray[np.bool_] | None:
+        """Which vertices of the source's topology lie inside mouth and eyes, ``(V,)``; None before the registration."""
+        return np.array(self.shot.array("register", "interior"), dtype=bool) if self.has_registration else None
+
+    @cached_property
     def weights(self) -> NDArray[np.float64]:
         """Weights of the bases ``(T, K)``, as found in the take."""
         return np.array(self.shot.array("bases", "weights"))
@@ -113,6 +122,25 @@ class ShotData:
         if self.pose is not None:
             return self.source_framing.moved(self.pose)
         return Framing.of(self.target.vertices)
+
+    @cached_property
+    def source_extras(self) -> Extras | None:
+        """What rides with the performer's head, eyeballs for one; only to look at."""
+        return self._extras(self.shot.config.source.extras, None)
+
+    @cached_property
+    def target_extras(self) -> Extras | None:
+        """What rides with the target's head."""
+        return self._extras(self.shot.config.target.extras, self.pose)
+
+    def _extras(self, paths: tuple[Path, ...], pose: Similarity | None) -> Extras | None:
+        still = HeadMotion.none(self.n_frames)
+        try:
+            motion = load_motion(self.shot) if self.has_result else still
+            return load_extras(paths, motion.seen_from(pose) if pose is not None and self.has_result else motion)
+        except (InputError, OSError) as error:
+            log.warning("without the extras: %s", error)  # a picture less, nothing that the work needs
+            return None
 
     def _has(self, stage: str, *names: str) -> bool:
         try:

@@ -18,6 +18,7 @@ from viewer.view.open3d_calls import DynamicMesh, gui
 __all__ = ["Pane"]
 
 _WIRE = np.array([0.06, 0.06, 0.07], np.float32)
+_IVORY = np.array([[0.86, 0.85, 0.82]], np.float32)
 _LABELS = 96
 
 
@@ -38,6 +39,8 @@ class Pane:
         self._normals = np.zeros((0, 3), np.float32)
         self._wires: DynamicMesh | None = None
         self._edges = np.zeros((0, 2), np.int32)
+        self._extras: DynamicMesh | None = None
+        self._extra_triangles: Any = None
         self._overlay: DynamicMesh | None = None
         self._capacity = 0
         self._labels: list[Any] = []
@@ -70,6 +73,7 @@ class Pane:
         )
         self._face.show()
         self._draw_wires(positions)
+        self._draw_extras(camera)
         self.widget.force_redraw()
 
     def draw_overlay(self) -> None:
@@ -101,6 +105,22 @@ class Pane:
         self._face = DynamicMesh(self.scene, "face", triangles, n_vertices)
         self._triangles = triangles
         self._normals = np.zeros((n_vertices, 3), np.float32)
+
+    def _draw_extras(self, camera: Any) -> None:
+        """Eyeballs and the like, of their own colour."""
+        found = self.app.extras(self.index)
+        if self._extras is not None and (found is None or self._extra_triangles is not found[1]):
+            self._extras.remove()
+            self._extras = None
+        if found is None:
+            return
+        if self._extras is None:
+            self._extras = DynamicMesh(self.scene, "extras", found[1], len(found[0]))
+            self._extra_triangles = found[1]
+        positions, colors = self._extras.next_buffers()
+        positions[:] = found[0]
+        shading.bake(positions, found[1], _IVORY, self.app.light, camera, np.empty_like(positions), colors)
+        self._extras.show()
 
     def _draw_wires(self, positions: Any) -> None:
         if not self.app.wireframe:
