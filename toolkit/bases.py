@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg.blas import dsyrk, ssyrk
 
 from toolkit.blocks import map_blocks
+from toolkit.compiled import njit
 from toolkit.errors import InputError
 from toolkit.progress import Progress, silent
 from toolkit.steadying import steady_weights

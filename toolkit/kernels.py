@@ -10,7 +10,8 @@ loops are short and write one thing each, into small work arrays that stay in th
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from toolkit.compiled import njit
 
 __all__ = [
     "block_frames",

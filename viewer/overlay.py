@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from toolkit.compiled import njit
 from toolkit.rendering import Camera
 from viewer.state.cameras import pixel_size
 from viewer.state.marks import Curve, Disc, Mark

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from toolkit.compiled import njit
 
 __all__ = ["lanczos_steps"]
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 import heapq
 
 import numpy as np
-from numba import njit
+
+from toolkit.compiled import njit
 
 __all__ = ["march", "seeds_round"]
 

@@ -57,7 +57,8 @@ def connected_components(triangles: NDArray[np.integer], n_vertices: int) -> tup
 
 
 def _edges_with_counts(triangles: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    directed = np.sort(directed_edges(triangles), axis=1)
-    n = int(directed.max(initial=-1)) + 1
-    keys, counts = np.unique(directed[:, 0] * n + directed[:, 1], return_counts=True)
-    return np.stack([keys // max(n, 1), keys % max(n, 1)], axis=1), counts
+    t = np.asarray(triangles, dtype=np.int64)
+    n = max(1, int(t.max(initial=-1)) + 1)
+    sides = [np.minimum(a, b) * n + np.maximum(a, b) for a, b in ((t[:, i], t[:, (i + 1) % 3]) for i in range(3))]
+    keys, counts = np.unique(np.concatenate(sides), return_counts=True)
+    return np.stack([keys // n, keys % n], axis=1), counts

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import cholesky_banded
+
+from toolkit.compiled import njit
 
 __all__ = ["FrameRows", "WeightsProblem", "time_matrix"]
 

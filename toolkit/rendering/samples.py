@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from toolkit.compiled import njit
 from toolkit.rendering.kernels import _lit
 
 __all__ = ["Finish", "KeyShadow", "Surface", "shade"]

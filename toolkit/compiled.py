@@ -1,0 +1,33 @@
+"""numba's compiler, for installations where compiled code cannot be kept, too."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import numba
+
+__all__ = ["njit"]
+
+log = logging.getLogger(__name__)
+
+
+def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """As `numba.njit`; ``cache=True`` is a wish only.
+
+    numba keeps compiled code beside the source or else in the user's cache, and refuses to be imported where it may
+    write to neither, as in some containers. There we compile in every process instead.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        try:
+            compiled: Callable[..., Any] = numba.njit(**options)(function)
+        except RuntimeError as error:
+            if not options.get("cache"):
+                raise
+            log.warning("compiling anew (%s); set NUMBA_CACHE_DIR to a folder that can be written", error)
+            compiled = numba.njit(**{**options, "cache": False})(function)
+        return compiled
+
+    return decorate
