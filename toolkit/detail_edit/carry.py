@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Ids = NDArray[np.int64]
 
+_COARSER = 1.2
+
 
 @dataclass(frozen=True, eq=False)
 class Carrier:
@@ -66,24 +68,46 @@ def carrier(
     used = used[known[used].all(axis=1)]
     if mirrored:
         used = used[:, ::-1]
-    triangle, weights = located(bent, used, goal.places)
     own, ready = _tangents(goal.places, goal.vertices, neighbours[1])
-    rows = np.flatnonzero((triangle >= 0) & ready)
-    corners, weights = used[triangle[rows]], weights[rows]
-    strength = np.einsum("nk,nk->n", weights, held[corners])
-    kept = strength > 1e-6
-    rows, corners, weights, strength = rows[kept], corners[kept], weights[kept], strength[kept]
+    taken = _samples(bent, used, goal)
+    strength = np.where(ready, taken @ held, 0)
+    rows = np.flatnonzero(strength > 1e-6)
+    up = sp.csr_matrix(size * taken[rows])
     # Into the plane by the tangent as it lies after the bend (or the mirror), out of it by the goal's own.
-    turn = own[rows, None].conj() * moved[corners]
-    shape = (len(rows), len(source.vertices))
-    at = (np.repeat(np.arange(len(rows)), 3), corners.ravel())
-    return Carrier(
-        source.vertices,
-        Region(goal.vertices[rows], np.minimum(strength, 1)),
-        sp.csr_matrix(((size * weights * turn).ravel(), at), shape=shape),
-        sp.csr_matrix(((size * weights).ravel(), at), shape=shape),
-        mirrored,
-    )
+    across = sp.csr_matrix(sp.diags(own[rows].conj()) @ up @ sp.diags(moved))
+    return Carrier(source.vertices, Region(goal.vertices[rows], np.minimum(strength[rows], 1)), across, up, mirrored)
+
+
+def _samples(bent: Complex, used: Ids, goal: FlatPatch) -> sp.csr_matrix:
+    """What each vertex of the goal takes of the source's vertices, ``(g, n)``; an empty row where there is no source.
+
+    Where the goal's mesh is coarser, half of it comes from round the vertex: single points of a wrinkle that is hardly
+    wider than an edge would make beads of it.
+    """
+    n = len(bent)
+    taken = _sampling(bent, used, goal.places, n)
+    there = np.diff(taken.indptr) > 0
+    ends = np.concatenate([goal.triangles[:, [0, 1]], goal.triangles[:, [1, 2]], goal.triangles[:, [2, 0]]])
+    ends = np.concatenate([ends, ends[:, ::-1]])
+    ends = ends[there[ends[:, 0]]]
+    if len(ends) == 0:
+        return taken
+    way = goal.places[ends[:, 1]] - goal.places[ends[:, 0]]
+    if np.median(np.abs(way)) < _COARSER * np.median(np.abs(bent[used[:, 0]] - bent[used[:, 1]])):
+        return taken
+    beside = _sampling(bent, used, goal.places[ends[:, 0]] + way / 3, n)
+    missing = np.diff(beside.indptr) == 0
+    beside = beside + sp.diags(missing.astype(float)) @ taken[ends[:, 0]]
+    count = np.maximum(np.bincount(ends[:, 0], minlength=len(goal.places)), 1)
+    gather = sp.csr_matrix((0.5 / count[ends[:, 0]], (ends[:, 0], np.arange(len(ends)))), (len(goal.places), len(ends)))
+    return sp.csr_matrix(0.5 * taken + gather @ beside)
+
+
+def _sampling(bent: Complex, used: Ids, queries: Complex, n: int) -> sp.csr_matrix:
+    triangle, weights = located(bent, used, queries)
+    rows = np.flatnonzero(triangle >= 0)
+    at = (np.repeat(rows, 3), used[triangle[rows]].ravel())
+    return sp.csr_matrix((weights[rows].ravel(), at), shape=(len(queries), n))
 
 
 def _tangents(places: Complex, vertices: Ids, neighbour: Ids) -> tuple[Complex, NDArray[np.bool_]]:
