@@ -161,8 +161,8 @@ def _pictures(session: EditSession, frames: list[int], options: argparse.Namespa
     from toolkit.rendering.shots import open_views
 
     views = open_views(session.shot, forward=options.forward, up=options.up)
-    close_up = options.close_up
-    sheet = preview_sheet(session, views, frames, width=options.width, turn=options.view_turn, close_up=close_up)
+    looks = {"width": options.width, "turn": options.view_turn, "close_up": options.close_up}
+    sheet = preview_sheet(views, frames, session.unedited_frame, session.frame, **looks)
     path: Path = options.out or session.shot.render_folder / "edit_preview.png"
     path.parent.mkdir(parents=True, exist_ok=True)
     with written_aside(path) as temporary:

@@ -16,6 +16,7 @@ from toolkit.rendering.shots import ShotViews, expressive_frames, open_views
 from toolkit.rendering.takes import View, performance_sheet
 from toolkit.report import sections
 from toolkit.report.data import Figure, ReportData, Section
+from toolkit.report.edits import edits_section
 from toolkit.report.maps import shot_registration_figures
 from toolkit.report.pictures import bases_figures, coating_figures, motion_figures
 from toolkit.shot import Shot
@@ -49,12 +50,14 @@ def report_data(
         lambda: _bases(shot, views),
         lambda: _transfer(shot, views, chosen),
         lambda: _details(shot),
+        lambda: edits_section(shot, views),
         lambda: _timings(shot),
         lambda: _parameters(shot),
     )
     made = _checks(shot)
     for done, step in enumerate(steps, start=1):
-        made.append(step())
+        section = step()
+        made += [] if section is None else [section]
         progress("making the report", done, len(steps))
     subtitle = f"{views.source.n_frames} frames at {views.fps:g} a second · {len(views.source.rest):,} vertices"
     return ReportData(
