@@ -3,9 +3,10 @@
 **How an edit goes on in time.** The paper asks the edited details for the same temporal and spatial gradients as the
 unedited ones (Eq. 20). The spatial part works against the edit itself, whose gradients are those of a wrinkle: at the
 paper's weights a wrinkle ten edges wide is changed by 83 % of what was asked at the key frame and by 34 % in the frames
-beside it (benchmarks/detail_edit.py); it flickers. "follow", the default, compares with the gradients of the *edited* source motion, which the
-operation gives for every frame of the window (scaled by the factor, pasted from the wrinkle as it is in that frame),
-faded out towards the ends. That reference meets the key frame and the ends exactly, so it is the minimum itself:
+beside it (benchmarks/detail_edit.py); it flickers. "follow", the default, compares with the gradients of the *edited*
+source motion, which the operation gives for every frame of the window (scaled by the factor, pasted from the wrinkle as
+it is in that frame), faded out towards the ends. That reference meets the key frame and the ends exactly, so it is the
+minimum itself:
 
     D'_t = D_t + a_t w (op(D)_t - D_t)          a_t `activation`, w the region with its band
 
