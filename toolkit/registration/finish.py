@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from toolkit.errors import InputError
-from toolkit.mesh import TriangleMesh, face_normals, vertex_adjacency, vertex_normals
+from toolkit.mesh import TriangleMesh, vertex_adjacency, vertex_normals
 from toolkit.registration.curves import Curve, closest_on_polyline
 from toolkit.registration.nonrigid import SheetedSurface, accepted
 from toolkit.registration.parameters import RegistrationParameters
 from toolkit.rigid import umeyama
 from toolkit.solve import factorise
 
-__all__ = ["follow", "project", "smooth_field", "unfold"]
+__all__ = ["follow", "project", "smooth_field"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -25,7 +25,6 @@ Mask = NDArray[np.bool_]
 _STEPS = 4
 _NEAR = 0.01
 """Only vertices whose offset is under this share of the extent are moved onto the surface."""
-_UNFOLDINGS, _TURNED = 5, 0.1
 _ERODINGS, _MOSTLY = 3, 0.4
 _NEIGHBOURS = 48
 
@@ -90,32 +89,6 @@ def _ragged(triangles: NDArray[np.integer], known: Mask, skin: Mask) -> Mask:
         lost = (adjacency @ (skin & (~known | ragged)).astype(float)) / around > _MOSTLY
         ragged |= skin & lost
     return ragged
-
-
-def unfold(posed: TriangleMesh, points: Array, skin: Mask) -> Array:
-    """Smooth out triangles that are turned over, or nearly, against the pose ``posed`` in which none is.
-
-    Round them the displacement from that pose is filled in from outside, over a ring that grows while it is needed.
-    """
-    triangles = posed.triangles
-    adjacency = vertex_adjacency(triangles, len(points)).astype(bool)
-    whole = skin[triangles].all(axis=1)
-    before = face_normals(posed.vertices, triangles)
-    loose = np.zeros(len(points), dtype=bool)
-    for _ in range(_UNFOLDINGS):
-        after = face_normals(points, triangles)
-        around = vertex_normals(points, triangles)[triangles].mean(axis=1)
-        bad = whole & (
-            (np.einsum("fd,fd->f", before, after) < _TURNED) | (np.einsum("fd,fd->f", after, around) < _TURNED)
-        )
-        if not bad.any():
-            break
-        seeds = np.zeros(len(points), dtype=bool)
-        seeds[triangles[bad]] = True
-        loose |= seeds | np.asarray(adjacency @ seeds)
-        loose &= skin
-        points = posed.vertices + _harmonic_fill(triangles, points - posed.vertices, ~loose)
-    return points
 
 
 def follow(mesh: TriangleMesh, posed: Array, points: Array, skin: Mask, parts: NDArray[np.integer]) -> Array:

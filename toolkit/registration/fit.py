@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from toolkit.mesh import connected_components
 from toolkit.progress import Progress
 from toolkit.registration.coarse import Coarse, Gather, decimate
-from toolkit.registration.finish import follow, project, smooth_field, unfold
+from toolkit.registration.finish import follow, project, smooth_field
 from toolkit.registration.nonrigid import solve_field
 from toolkit.registration.parameters import RegistrationParameters
 from toolkit.registration.prepare import Job
+from toolkit.registration.unfolding import unfold
 
 __all__ = ["fit"]
 
@@ -45,6 +46,6 @@ def fit(job: Job, parameters: RegistrationParameters, progress: Progress) -> Arr
         rims = [curve for curve in job.curves if curve.opening]
         near = job.source.with_vertices(moved)
         moved = project(near, job.skin, job.surface, job.labels, rims, job.extent, parameters)
-    moved = unfold(job.source.with_vertices(job.posed), moved, job.skin)
+    moved = unfold(job.source, moved, job.skin, lambda points: job.surface.closest(points, job.labels))
     _, parts = connected_components(job.source.triangles, job.source.n_vertices)
     return follow(job.source, job.posed, moved, job.skin, parts)

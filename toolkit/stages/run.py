@@ -45,7 +45,7 @@ STAGES: dict[str, Stage] = {
     stage.name: stage
     for stage in (
         Stage("inputs", (), (), inputs.work),
-        Stage("register", ("inputs",), ("register",), register.work),
+        Stage("register", ("inputs",), ("register",), register.work, version=2),
         Stage(
             "decompose",
             ("inputs",),
