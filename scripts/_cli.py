@@ -92,12 +92,26 @@ def run(parser: argparse.ArgumentParser, main: Main, arguments: list[str] | None
         bars.close()
         print("stopped; what was finished is kept", file=sys.stderr)
         return 130
+    except OSError as error:
+        bars.close()
+        return _fail(_of_the_system(error), options, 2 if isinstance(error, _BAD_PLACES) else 1)
     except Exception as error:
         bars.close()
         return _fail(error, options, 1)
     if options.json:
         print(json.dumps(result, default=_plain))
     return 1 if result.get("failed") else 0
+
+
+_BAD_PLACES = (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError, FileExistsError)
+"""Of the system's errors those that another path or its permissions mend; a full disk is none of them."""
+
+
+def _of_the_system(error: OSError) -> InputError:
+    """What the system says, as a sentence."""
+    said = (error.strerror or str(error) or type(error).__name__).lower()
+    remedy = "check that the folder is there and that you may write to it"
+    return InputError(said, where=error.filename or "", remedy=remedy if isinstance(error, _BAD_PLACES) else "")
 
 
 def print_stages(reports: list[Any]) -> None:

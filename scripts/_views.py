@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-__all__ = ["add_axes", "numbers_list", "vector"]
+__all__ = ["add_axes", "numbers_list", "positive", "positive_number", "vector"]
 
 
 def add_axes(parser: argparse._ActionsContainer) -> None:
@@ -26,6 +26,28 @@ def vector(text: str) -> tuple[float, float, float]:
     if x == y == z == 0:
         raise argparse.ArgumentTypeError("a direction cannot be 0,0,0")
     return x, y, z
+
+
+def positive(text: str) -> int:
+    """Parse a whole number above 0."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above 0")
+    return value
+
+
+def positive_number(text: str) -> float:
+    """Parse a finite number above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return value
 
 
 def numbers_list(text: str) -> list[int]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from _cli import parser_for, run
+from _views import positive_number
 
 from toolkit.progress import Progress
 
@@ -54,7 +55,7 @@ def parser() -> argparse.ArgumentParser:
     for side in ("source", "target"):
         what = f"meshes for the {side}'s pictures only, e.g. eyeballs; they ride with the head"
         made.add_argument(f"--{side}-extras", metavar="F", type=Path, nargs="+", default=[], help=what)
-    made.add_argument("--fps", metavar="N", type=float, help="frames a second, if the take does not say it")
+    made.add_argument("--fps", metavar="N", type=positive_number, help="frames a second, if the take does not say it")
     made.add_argument("--force", action="store_true", help="write shot.toml anew if it is there")
     return made
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from _cli import parser_for, run
-from _views import add_axes, numbers_list
+from _views import add_axes, numbers_list, positive, positive_number
 
 from toolkit.errors import InputError
 from toolkit.progress import Progress
@@ -120,7 +120,9 @@ def parser() -> argparse.ArgumentParser:
     """The options."""
     made = parser_for(__doc__, shot=False)
     made.add_argument("shots", metavar="DIR", nargs="+", type=Path, help="shot folders")
-    made.add_argument("--count", type=int, default=7, metavar="N", help="frames on the sheets, chosen to differ (7)")
+    made.add_argument(
+        "--count", type=positive, default=7, metavar="N", help="frames on the sheets, chosen to differ (7)"
+    )
     made.add_argument("--frames", type=numbers_list, metavar="A,B,...", help="or exactly these frames")
     made.add_argument(
         "--close-up", action="append", default=[], choices=["eyes", "mouth", "forehead"], help="repeatable"
@@ -130,9 +132,9 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--every", type=int, default=1, metavar="N", help="every Nth frame of the video, in real time (1)"
     )
-    made.add_argument("--fps", type=float, help="the video's frame rate, if not the take's")
-    made.add_argument("--width", type=int, default=300, help="width of a picture on the sheet in pixels (300)")
-    made.add_argument("--height", type=int, default=600, help="height of the video in pixels (600)")
+    made.add_argument("--fps", type=positive_number, help="the video's frame rate, if not the take's")
+    made.add_argument("--width", type=positive, default=300, help="width of a picture on the sheet in pixels (300)")
+    made.add_argument("--height", type=positive, default=600, help="height of the video in pixels (600)")
     made.add_argument("--turn", type=float, default=0.0, metavar="DEGREES", help="look from the side (0)")
     made.add_argument("--title", default="", help="written on the contact sheet")
     made.add_argument("--out", metavar="FOLDER", help="where to write (DIR/render)")

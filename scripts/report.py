@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 from _cli import parser_for, run
-from _views import add_axes
+from _views import add_axes, positive
 
 from toolkit.progress import Progress
 
@@ -33,7 +33,7 @@ def parser() -> argparse.ArgumentParser:
     """The options."""
     made = parser_for(__doc__)
     add_axes(made)
-    made.add_argument("--count", type=int, default=7, metavar="N", help="frames on the contact sheet (7)")
+    made.add_argument("--count", type=positive, default=7, metavar="N", help="frames on the contact sheet (7)")
     made.add_argument("--out", metavar="FILE", help="where to write it (DIR/report.html)")
     return made
 

@@ -110,6 +110,8 @@ def test_file_round_trip_and_bad_files(tmp_path: Path) -> None:
         load_feature_lines(path, 8, 2)
     with pytest.raises(InputError, match="target vertex 1"):
         load_feature_lines(path, 9, 1)
-    path.write_text(json.dumps({"curves": []}))
-    with pytest.raises(InputError, match="no feature-line file"):
-        load_feature_lines(path)
+    line = {"name": "lip", "closed": "no", "vertices": [1, 2]}
+    for content in ({"curves": []}, {"lines": [7]}, {"lines": [line]}):
+        path.write_text(json.dumps(content))
+        with pytest.raises(InputError, match="no feature-line file"):
+            load_feature_lines(path)

@@ -199,10 +199,12 @@ def load_feature_lines(path: str | Path, n_source: int | None = None, n_target: 
 
 
 def _line_from(entry: dict[str, Any]) -> FeatureLine:
+    if not isinstance(entry, dict) or not isinstance(entry["closed"], bool):
+        raise ValueError(f"{entry} is no line, or its closed is neither true nor false")
     target = entry.get("target_vertices")
     return FeatureLine(
         str(entry["name"]),
-        bool(entry["closed"]),
+        entry["closed"],
         np.asarray(entry["vertices"], dtype=np.int64).reshape(-1),
         None if target is None else np.asarray(target, dtype=np.int64).reshape(-1),
     )

@@ -117,6 +117,20 @@ def test_missing_files(tmp_path: Path, name: str, arguments: list[str], sentence
 def test_bad_usage_is_exit_code_2() -> None:
     assert script("7_export", "x", "--format", "fbx").returncode == 2
     assert script("run_all").returncode == 2
+    for option in ("--count", "--width", "--height"):
+        done = script("render", "x", option, "0")
+        assert done.returncode == 2
+        assert f"{option}: '0' is not a whole number above 0" in done.stderr
+    files = ["--source-reference", "a.obj", "--frames", "b", "--target", "c"]
+    assert "'0' is not a number above 0" in script("new_shot", "x", *files, "--fps", "0").stderr
+
+
+def test_a_place_that_cannot_be_written_is_one_sentence(inputs: dict[str, Path], tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    done = new_shot(tmp_path / "file" / "shot", inputs)
+    assert done.returncode == 2
+    assert "not a directory; check that the folder is there and that you may write to it." in done.stderr
+    assert "Errno" not in done.stderr
 
 
 def test_the_sources_stay_as_they_are(inputs: dict[str, Path], tmp_path: Path) -> None:

@@ -69,3 +69,6 @@ def test_missing_inputs(tmp_path: Path) -> None:
         load_config(_written(tmp_path, MINIMAL.replace('frames = "take"\n', "")))
     with pytest.raises(InputError, match="not TOML"):
         load_config(_written(tmp_path, MINIMAL + "x = = 3"))
+    (tmp_path / "shot.toml").write_bytes(MINIMAL.encode("utf-16"))
+    with pytest.raises(InputError, match="not TOML"):
+        load_config(tmp_path / "shot.toml")

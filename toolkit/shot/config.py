@@ -86,7 +86,7 @@ def load_config(path: Path) -> ShotConfig:
         raise InputError(
             "there is no shot.toml", where=path.parent, remedy="make the shot with scripts/new_shot.py"
         ) from None
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"this is not TOML ({error})", where=path, remedy="mend that line") from None
     _known(data, ["source", "target", *_STAGES], "table", path)
     kinds = {"reference": str, "frames": str, "fps": float, "extras": list}
