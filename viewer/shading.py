@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from toolkit.compiled import njit
 from toolkit.rendering import Camera
 
-__all__ = ["CLAY", "PLAIN", "SKIN", "Light", "bake", "directions"]
+__all__ = ["CLAY", "SKIN", "Light", "bake", "directions"]
 
 Array = NDArray[Any]
 
 SKIN = (0.80, 0.60, 0.50)
 CLAY = (0.66, 0.67, 0.70)
-PLAIN = (0.72, 0.72, 0.72)
+_SOFT = (0.28, 0.08, 0.78, 0.0)
 
 
 @dataclass(frozen=True)
@@ -52,17 +52,24 @@ def bake(
     camera: Camera,
     normals: NDArray[np.float32],
     out: NDArray[np.float32],
+    *,
+    soft: bool = False,
 ) -> None:
     """Fill ``out`` (V, 3) with the lit colours.
 
     ``base`` (V, 3) or (1, 3) colours of the surface in 0..1 as seen under full light; ``normals`` (V, 3) is working
-    space and holds the unit normals afterwards.
+    space and holds the unit normals afterwards. ``soft`` is for colour maps, whose colours must stay readable.
     """
     _normals(vertices, triangles, normals)
     towards = directions(light, camera)
-    strengths = np.array([1.1 * light.raking, 0.2, 0.5 - 0.3 * light.raking, 0.12], dtype=np.float32)
+    strengths = np.array(_SOFT if soft else _lights(light.raking), dtype=np.float32)
     eye = np.asarray(camera.position, dtype=np.float32)
     _light(vertices, normals, base, towards, strengths, eye, out)
+
+
+def _lights(raking: float) -> tuple[float, float, float, float]:
+    """Strengths of key, fill, headlight and gloss."""
+    return 1.1 * raking, 0.2, 0.5 - 0.3 * raking, 0.12
 
 
 @njit(cache=True, nogil=True, fastmath=True)

@@ -30,9 +30,9 @@ class Pane:
     send : takes the events
     """
 
-    def __init__(self, window: Any, app: App, index: int, send: Callable[[Pointer], None]) -> None:
-        self.app, self.index, self._send = app, index, send
-        self.widget, self.scene = native.new_scene(window)
+    def __init__(self, window: Any, app: App, index: int, send: Callable[[Pointer], None], smooth: bool = True) -> None:
+        self.app, self.index, self._send, self._smooth = app, index, send, smooth
+        self.widget, self.scene = native.new_scene(window, smooth)
         self.widget.set_on_mouse(self._mouse)
         self._face: DynamicMesh | None = None
         self._triangles: Any = None
@@ -69,7 +69,14 @@ class Pane:
         positions, colors = self._face.next_buffers()
         positions[:] = surface.vertices
         shading.bake(
-            positions, surface.triangles, app.base_colors(self.index), app.light, camera, self._normals, colors
+            positions,
+            surface.triangles,
+            app.base_colors(self.index),
+            app.light,
+            camera,
+            self._normals,
+            colors,
+            soft=app.field(self.index) is not None,
         )
         self._face.show()
         self._draw_wires(positions)
@@ -87,9 +94,7 @@ class Pane:
                 self._overlay.remove()
             triangles = max(512, 2 * len(corners) // overlay.CORNERS)
             self._capacity = triangles * overlay.CORNERS
-            self._overlay = DynamicMesh(
-                self.scene, f"overlay {self._capacity}", overlay.triangles_for(triangles), self._capacity
-            )
+            self._overlay = self._mesh(f"overlay {self._capacity}", overlay.triangles_for(triangles), self._capacity)
         to_positions, to_colors = self._overlay.next_buffers()
         to_positions[: len(corners)], to_colors[: len(corners)] = corners, colors
         to_positions[len(corners) :] = _hidden(camera)
@@ -97,12 +102,15 @@ class Pane:
         self._draw_labels(marks)
         self.widget.force_redraw()
 
+    def _mesh(self, name: str, triangles: Any, n_vertices: int) -> DynamicMesh:
+        return DynamicMesh(self.scene, name, triangles, n_vertices)
+
     def _replace_face(self, triangles: Any, n_vertices: int) -> None:
         for mesh in (self._face, self._wires):
             if mesh is not None:
                 mesh.remove()
         self._wires = None
-        self._face = DynamicMesh(self.scene, "face", triangles, n_vertices)
+        self._face = self._mesh("face", triangles, n_vertices)
         self._triangles = triangles
         self._normals = np.zeros((n_vertices, 3), np.float32)
 
@@ -115,7 +123,7 @@ class Pane:
         if found is None:
             return
         if self._extras is None:
-            self._extras = DynamicMesh(self.scene, "extras", found[1], len(found[0]))
+            self._extras = self._mesh("extras", found[1], len(found[0]))
             self._extra_triangles = found[1]
         positions, colors = self._extras.next_buffers()
         positions[:] = found[0]
@@ -130,9 +138,7 @@ class Pane:
             return
         if self._wires is None:
             self._edges = self.app.edges(self.index)
-            self._wires = DynamicMesh(
-                self.scene, "wires", overlay.wire_triangles(len(self._edges)), 4 * len(self._edges)
-            )
+            self._wires = self._mesh("wires", overlay.wire_triangles(len(self._edges)), 4 * len(self._edges))
         to_positions, to_colors = self._wires.next_buffers()
         to_colors[:] = _WIRE
         camera, height = self.app.framing_camera(self.index), self.app.pane_sizes[self.index][1]

@@ -29,6 +29,9 @@ log = logging.getLogger(__name__)
 
 _PANEL_EM = 24.0
 _TIMES_EM, _PICTURE_EM, _STATUS_EM = 2.1, 7.0, 1.9
+# Seconds after a change when it is drawn again: a busy renderer leaves frames out, and the last one would be seen
+# only at the next event.
+_AGAIN = (0.05, 0.15, 0.4, 1.0, 2.0)
 _TITLE = (0.80, 0.82, 0.86)
 _TONES = {"plain": (0.86, 0.88, 0.91), "good": (0.45, 0.85, 0.52), "bad": (1.0, 0.55, 0.42)}
 
@@ -68,6 +71,7 @@ class Window:
         self._held: set[str] = set()
         self._last = time.monotonic()
         self._settle = 3
+        self._again: list[float] = []
         self._quitting = False
         self._stale, self._was_busy = True, False
 
@@ -174,9 +178,15 @@ class Window:
             changes.add("camera")
         if changes:
             self._draw(changes)
+            self._again = [now + later for later in _AGAIN]
+        again = bool(self._again) and now >= self._again[0]
+        if again:
+            self._again = [when for when in self._again if when > now]
+            for pane in self.panes:
+                pane.widget.force_redraw()
         if self._state_file is not None:
             self._write_state(bool(changes))
-        return bool(changes)
+        return bool(changes) or again
 
     def _write_state(self, changed: bool) -> None:
         """After changes, and once more when they have been drawn."""
