@@ -30,9 +30,9 @@ class Pane:
     send : takes the events
     """
 
-    def __init__(self, window: Any, app: App, index: int, send: Callable[[Pointer], None], smooth: bool = True) -> None:
-        self.app, self.index, self._send, self._smooth = app, index, send, smooth
-        self.widget, self.scene = native.new_scene(window, smooth)
+    def __init__(self, window: Any, app: App, index: int, send: Callable[[Pointer], None]) -> None:
+        self.app, self.index, self._send = app, index, send
+        self.widget, self.scene = native.new_scene(window)
         self.widget.set_on_mouse(self._mouse)
         self._face: DynamicMesh | None = None
         self._triangles: Any = None
