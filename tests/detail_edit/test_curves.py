@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from toolkit.detail_edit import Surface, SurfacePoint, drawn, snapped
+from toolkit.detail_edit.ground import Ground
 from toolkit.errors import InputError
 
 
@@ -63,3 +64,16 @@ def test_parts_that_do_not_hang_together_are_said() -> None:
         drawn(surface, [surface.at_vertex(0), surface.at_vertex(4)])
     with pytest.raises(InputError, match="at least two points"):
         drawn(surface, [surface.at_vertex(0)])
+
+
+def test_the_closest_point_of_a_triangle_is_the_closest_of_many() -> None:
+    rng = np.random.default_rng(0)
+    corners, points = rng.standard_normal((60, 3, 3)), 1.5 * rng.standard_normal((60, 3))
+    steps = [(a, b) for a in np.linspace(0, 1, 101) for b in np.linspace(0, 1, 101) if a + b <= 1]
+    grid = np.array([(1 - a - b, a, b) for a, b in steps])
+    for corner, point in zip(corners, points, strict=True):
+        place, _, weights = Ground(Surface(corner, np.array([[0, 1, 2]]))).closest(point[None])
+        found, best = np.linalg.norm(place[0] - point), np.linalg.norm(grid @ corner - point, axis=1).min()
+        assert best - 0.002 < found <= best + 1e-12
+        assert weights.min() > -1e-12
+        assert weights.sum() == pytest.approx(1)

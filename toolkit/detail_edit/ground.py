@@ -46,22 +46,28 @@ class Ground:
 
 
 def _closest_weights(points: Array, corners: Array) -> Array:
-    """Weights ``(..., 3)`` of the points of triangles ``(..., 3, 3)`` closest to ``points`` (..., 3)."""
-    a, b, c = (corners[..., k, :] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    square = np.maximum((normal**2).sum(axis=-1), 1e-300)
-    second = (np.cross(points - a, c - a) * normal).sum(axis=-1) / square
-    third = (np.cross(b - a, points - a) * normal).sum(axis=-1) / square
-    inside = np.stack([1 - second - third, second, third], axis=-1)
-    best, shortest = inside, np.where(inside.min(axis=-1) >= 0, 0.0, np.inf)
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        start, side = corners[..., i, :], corners[..., j, :] - corners[..., i, :]
-        along = ((points - start) * side).sum(axis=-1) / np.maximum((side**2).sum(axis=-1), 1e-300)
-        along = np.clip(along, 0, 1)
-        away = ((start + along[..., None] * side - points) ** 2).sum(axis=-1)
-        edge = np.zeros_like(inside)
-        edge[..., i], edge[..., j] = 1 - along, along
-        nearer = away < shortest
-        best = np.where(nearer[..., None], edge, best)
-        shortest = np.minimum(shortest, away)
-    return best
+    """Weights ``(..., 3)`` of the points of triangles ``(..., 3, 3)`` closest to ``points`` (..., 3).
+
+    By scalar products alone: curves ask this of a few points at a time, hundreds of times.
+    """
+    first, second = corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]
+    off = points - corners[..., 0, :]
+    aa, ab, bb = (np.einsum("...d,...d->...", x, y) for x, y in ((first, first), (first, second), (second, second)))
+    pa, pb = np.einsum("...d,...d->...", off, first), np.einsum("...d,...d->...", off, second)
+    area = np.maximum(aa * bb - ab**2, 1e-300)
+    u, v = (bb * pa - ab * pb) / area, (aa * pb - ab * pa) / area
+    outside = (u < 0) | (v < 0) | (u + v > 1)
+    along = np.clip((pb - pa - ab + aa) / np.maximum(aa - 2 * ab + bb, 1e-300), 0, 1)
+    nothing = np.zeros_like(pa)
+    sides = (
+        (np.clip(pa / np.maximum(aa, 1e-300), 0, 1), nothing),
+        (nothing, np.clip(pb / np.maximum(bb, 1e-300), 0, 1)),
+        (1 - along, along),
+    )
+    nearest = np.full(pa.shape, np.inf)
+    for a, b in sides:
+        away = a * a * aa + 2 * a * b * ab + b * b * bb - 2 * (a * pa + b * pb)  # less |off|^2, the same for all
+        better = outside & (away < nearest)
+        u, v = np.where(better, a, u), np.where(better, b, v)
+        nearest = np.where(better, away, nearest)
+    return np.stack([1 - u - v, u, v], axis=-1)
