@@ -9,6 +9,7 @@ same system; it is factorised once and solved for all bases.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -109,7 +110,11 @@ class DeformationTransfer:
         self.matrix = sp.csc_matrix(
             sum((rows.T @ rows for rows in blocks if rows.shape[0]), start=sp.csc_matrix((len(target), len(target))))
         )
-        self.factor: Factor = factorise(self.matrix)
+
+    @cached_property
+    def factor(self) -> Factor:
+        """The matrix's factor, made when it is first needed: edits may want that of a nearby matrix instead."""
+        return factorise(self.matrix)
 
     @property
     def has_contacts(self) -> bool:

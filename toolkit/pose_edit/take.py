@@ -27,7 +27,10 @@ class TransferSystem(Protocol):
     """The part of `toolkit.transfer.DeformationTransfer` that edits need: ``A`` and its factor."""
 
     matrix: sp.csc_matrix
-    factor: Factor
+
+    @property
+    def factor(self) -> Factor:
+        """Of the matrix."""
 
 
 @dataclass(frozen=True)
