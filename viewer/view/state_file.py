@@ -24,6 +24,8 @@ def write_state(path: Path, window: Window) -> None:
     state = {
         "size": [size.width, size.height],
         "busy": app.worker.busy,
+        "script": window.playing_script,
+        "slowest_tick": round(window.slowest, 4),
         "playing": app.play.playing,
         "frame": app.play.frame,
         "window": app.play.window,

@@ -32,6 +32,7 @@ _TIMES_EM, _PICTURE_EM, _STATUS_EM = 2.1, 7.0, 1.9
 # Seconds after a change when it is drawn again: a busy renderer leaves frames out, and the last one would be seen
 # only at the next event.
 _AGAIN = (0.05, 0.15, 0.4, 1.0, 2.0)
+_WARM = 20  # ticks in which compiled code is loaded and the first pictures are made
 _TITLE = (0.80, 0.82, 0.86)
 _TONES = {"plain": (0.86, 0.88, 0.91), "good": (0.45, 0.85, 0.52), "bad": (1.0, 0.55, 0.42)}
 
@@ -74,6 +75,7 @@ class Window:
         self._again: list[float] = []
         self._quitting = False
         self._stale, self._was_busy = True, False
+        self._ticks, self.slowest = 0, 0.0
 
     def run(self) -> None:
         """Until the window is closed."""
@@ -102,6 +104,11 @@ class Window:
 
         for index, pane in enumerate(self.panes):
             native.save_scene(pane.scene, partial(got, index))
+
+    @property
+    def playing_script(self) -> bool:
+        """Whether a script has lines left."""
+        return self._player is not None and not self._player.finished
 
     # -- building -------------------------------------------------------------------------------------------------
 
@@ -167,6 +174,7 @@ class Window:
         passed, self._last = now - self._last, now
         if self._player is not None:
             self._player.play(self.send, self.app, self)
+        self._ticks += 1
         self.panel.tick()
         self.app.tick(min(passed, 0.5))
         if self.app.quit_asked and not self._quitting:
@@ -184,6 +192,8 @@ class Window:
             self._again = [when for when in self._again if when > now]
             for pane in self.panes:
                 pane.widget.force_redraw()
+        if self._ticks > _WARM:
+            self.slowest = max(self.slowest, time.monotonic() - now)
         if self._state_file is not None:
             self._write_state(bool(changes))
         return bool(changes) or again
