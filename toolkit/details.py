@@ -154,10 +154,12 @@ class Reconstruction:
         other = copy.copy(self)
         other._weights = np.asarray(weights, dtype=np.float32)
         other._bases_changes, other._details_changes = tuple(bases), tuple(details)
-        static = np.array(self._target.rest.detail)
-        for change in details:
-            change.apply_static(static)
-        other._own_change = (static - self._target.rest.detail)[self._order].astype(np.float32)
+        other._own_change = np.zeros_like(self._own)
+        if details:
+            static = np.array(self._target.rest.detail)
+            for change in details:
+                change.apply_static(static)
+            other._own_change = (static - self._target.rest.detail)[self._order].astype(np.float32)
         return other
 
     def frames(self, start: int, stop: int, details: NDArray[np.float32], out: NDArray[np.float32]) -> None:

@@ -13,6 +13,7 @@ frame at a time; they only finish: weights that the interior point leaves next t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -76,6 +77,11 @@ class WeightsProblem:
     time: sp.csr_matrix
     gram: Array | None
     lower: Array
+
+    @cached_property
+    def bands(self) -> Array:
+        """Lower bands of the matrix of `cost`; see `_bands`."""
+        return _bands(self, len(self.lower))
 
     def cost(self, change: Array) -> float:
         """What the change ``u`` (n, K) costs, constraints aside."""
@@ -176,7 +182,7 @@ class _System:
         self._shape = extra.shape
         self._rows = FrameRows(rows.frames, np.where(stuck[rows.frames], 0.0, rows.local))
         free = self._flat(self._open)
-        bands = _bands(problem, len(extra))
+        bands = problem.bands.copy()
         bands[0] += np.where(free, self._flat(np.where(stuck, 0.0, extra)), 0.0)
         for offset in range(len(bands)):
             length = max(len(free) - offset, 0)
