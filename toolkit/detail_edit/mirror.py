@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.spatial import cKDTree
 from toolkit.detail_edit.ground import Ground
 from toolkit.detail_edit.region import Region
 from toolkit.detail_edit.surface import Surface, SurfacePoint
+from toolkit.mesh.geometry import vertex_normals
 
 __all__ = ["Mirror"]
 
@@ -35,7 +37,9 @@ class Mirror:
         used = np.unique(surface.triangles)
         sample = used[:: max(len(used) // _SAMPLES, 1)]
         self._points = surface.vertices[sample]
-        self.point, self.normal = _best_plane(self._points)
+        normals = vertex_normals(surface.vertices, surface.triangles)[used]
+        face = _Face(surface.vertices[used], normals, cKDTree(surface.vertices[used]))
+        self.point, self.normal = _best_plane(self._points, face)
 
     def reflected(self, points: Array) -> Array:
         """Points ``(n, 3)`` on the other side of the plane."""
@@ -87,31 +91,48 @@ class Mirror:
         return tree, shift
 
 
-def _best_plane(points: Array) -> tuple[Array, Array]:
+@dataclass(frozen=True, eq=False)
+class _Face:
+    """All places of a face (n, 3) with their normals, to be looked up."""
+
+    places: Array
+    normals: Array
+    tree: cKDTree
+
+
+def _best_plane(points: Array, face: _Face) -> tuple[Array, Array]:
     """The plane that fits best from any of the three main axes; found on few points, then refined on all."""
     centre = points.mean(axis=0)
     few = points[:: max(len(points) // _FEW, 1)]
     axes = np.linalg.eigh(np.cov((points - centre).T))[1].T
-    fits = [_fitted_plane(few, centre, axis) for axis in axes]
+    fits = [_fitted_plane(few, face, centre, axis) for axis in axes]
     _, point, normal = min(fits, key=lambda fit: fit[0])
-    return _fitted_plane(points, point, normal)[1:]
+    return _fitted_plane(points, face, point, normal)[1:]
 
 
-def _fitted_plane(points: Array, point: Array, normal: Array) -> tuple[float, Array, Array]:
-    """Refine a plane; returns the mean distance of the reflected points from the face, and the plane."""
-    tree = cKDTree(points)
+def _fitted_plane(points: Array, face: _Face, point: Array, normal: Array) -> tuple[float, Array, Array]:
+    """Refine a plane; returns the mean distance of the reflected points from the face, and the plane.
+
+    Gauss-Newton on the distances to the tangent planes at the closest places, the farthest fifth left out; three
+    unknowns: the plane's shift and its normal's two turns.
+    """
     off = np.inf
     for _ in range(_ROUNDS):
-        reflected = points - 2 * np.outer((points - point) @ normal, normal)
-        distance, nearest = tree.query(reflected)
+        height = (points - point) @ normal
+        reflected = points - 2 * height[:, None] * normal
+        distance, nearest = face.tree.query(reflected)
         pairs = distance <= np.quantile(distance, 0.8)
         off = float(distance[pairs].mean())
-        start, end = points[pairs], points[nearest[pairs]]
-        point = ((start + end) / 2).mean(axis=0)
-        # Reflection takes s - m to e - m: their outer product is smallest along the normal.
-        outer = (start - point).T @ (end - point)
-        _, vectors = np.linalg.eigh(outer + outer.T)
-        before, normal = normal, vectors[:, 0]
-        if abs(before @ normal) > 1 - 1e-12:
+        p, h, there = points[pairs] - point, height[pairs], nearest[pairs]
+        out = face.normals[there]
+        turns = np.linalg.svd(normal[None])[2][1:]
+        moves = [-2 * ((p @ turn)[:, None] * normal + h[:, None] * turn) for turn in turns]
+        slopes = np.stack([*((out * move).sum(axis=1) for move in moves), 2 * out @ normal], axis=1)
+        residual = (out * (reflected[pairs] - face.places[there])).sum(axis=1)
+        step = np.linalg.lstsq(slopes, -residual, rcond=None)[0]
+        point = point + step[2] * normal
+        normal = normal + step[:2] @ turns
+        normal = normal / np.linalg.norm(normal)
+        if np.abs(step).max() < 1e-9:
             break
     return off, point, normal
