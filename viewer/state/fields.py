@@ -40,11 +40,15 @@ class Field:
         return colors
 
 
-def scaled(name: str, values: NDArray[np.floating], unit: str) -> Field:
-    """A field of one of the maps, from zero to nearly its largest value, rounded, so that legends do not flicker."""
+def scaled(name: str, values: NDArray[np.floating], unit: str, least: float = 0.0) -> Field:
+    """A field of one of the maps, from zero to nearly its largest value, rounded, so that legends do not flicker.
+
+    ``least`` keeps rounding errors from being spread over all colours.
+    """
     label = dict(MAPS)[name]
     finite = values[np.isfinite(values)]
     high = float(np.percentile(finite, _PERCENTILE[name])) if len(finite) else 0.0
+    high = max(high, least)
     cmap = {"difference": "magma", "coating": "viridis", "distance": "viridis"}[name]
     return Field(values, ColorScale(0.0, _round_up(high), label, unit, cmap))
 

@@ -19,6 +19,8 @@ __all__ = ["field_of", "help_lines", "panel_rows", "sensible_map", "skin_of", "s
 
 _MODES_IN_A_ROW = 4
 _INSIDE = 0.25
+# Of the face's height: what a registration may well be off by.
+_FAR = 0.004
 
 
 def panel_rows(app: App) -> list[Row]:
@@ -152,7 +154,10 @@ def field_of(app: App, name: str) -> Field | None:
     if name == "distance":
         if not app.data.has_registration:
             return None
-        return app.kept_field(("distance",), lambda: scaled("distance", app.data.distance, "the target's unit"))
+        return app.kept_field(
+            ("distance",),
+            lambda: scaled("distance", app.data.distance, "the target's unit", _FAR * app.data.target_framing.height),
+        )
     if name == "difference" and app.data.has_result:
         before, after = app.surface_named("before"), app.surface_named("result")
         apart = np.linalg.norm(after.vertices - before.vertices, axis=1)

@@ -157,7 +157,7 @@ class Window:
         self._place_legend()
         need = self._help.calc_preferred_size(context, gui.Widget.Constraints())
         self._help.frame = gui.Rect(left + int(2 * em), top + int(2 * em), need.width, need.height)
-        self._settle = 3
+        self._settle, self._stale = 3, True
         self.app.touch("camera", "faces", "overlay", "timeline")
 
     def _place_legend(self) -> None:

@@ -152,7 +152,9 @@ class Desk:
 
     def button(self, name: str) -> None:
         """Click the panel's widget of that name."""
-        x, y, width, height = self.wait(lambda state: name in state["widgets"])["widgets"][name]
+        self.wait(lambda state: name in state["widgets"])
+        time.sleep(0.5)  # the panel may just be laid out again
+        x, y, width, height = self.state["widgets"][name]
         self.click(x + width // 2, y + height // 2)
 
     def resize(self, width: int, height: int) -> None:

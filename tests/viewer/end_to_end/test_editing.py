@@ -12,7 +12,6 @@ import pytest
 from toolkit.editing import EditSession
 from toolkit.shot import Shot
 from toolkit.shot.journal import Journal
-from viewer import timeline
 from viewer.picking import Picker
 from viewer.state.cameras import Viewpoint
 from viewer.state.shot_data import ShotData
@@ -101,39 +100,6 @@ def _scrub_play_and_turn(desk: Any, data: ShotData) -> None:
     x, y, width, height = desk.state["panes"][0]
     desk.drag((x + 20, y + height // 2), (x + 140, y + height // 2 + 30))
     assert desk.wait(lambda state: state["views"][0]["azimuth"] != 0)["views"][0]["azimuth"] < -5
-
-
-def test_a_wrinkle_is_painted_away(shot: Path, sit_down: Callable) -> None:
-    data = ShotData(Shot(shot))
-    details = np.linalg.norm(Shot(shot).array("decompose", "details"), axis=2)
-    frame = int(np.argmax(details.mean(axis=1)))  # where the face is most wrinkled
-    desk = sit_down(shot)
-    desk.wait(lambda state: state["editable"])
-    left, top, width, height = desk.state["timeline"]
-    place = timeline.Layout(width, height, data.n_frames).x(frame)
-    desk.click(left + place, top + height // 3)
-    desk.key("5")
-    desk.wait(lambda state: state["mode"] == "detail" and state["frame"] == frame)
-    x, y = desk.pixel(
-        1, np.array(data.target_framing.centre) + [0, 0.22 * data.target_framing.height, 0], data.target_framing
-    )
-    desk.drag((x - 40, y), (x + 40, y + 6), steps=10)
-    desk.button("remove")
-    desk.wait()
-    desk.picture("detail_painted")
-    desk.key("Return")
-    desk.wait(lambda state: len(state["edits"]) == 1)
-    desk.picture("detail_committed")
-    (edit,) = edits(shot)
-    assert edit.kind == "detail"
-    session = EditSession.open(Shot(shot))
-    moved = np.linalg.norm(session.frame(frame) - session.unedited_frame(frame), axis=1)
-    assert moved.max() > 0
-    assert (moved > 0).mean() < 0.5
-    desk.key("z")
-    desk.wait(lambda state: not state["edits"])
-    desk.close()
-    assert edits(shot) == ()
 
 
 def test_a_kill_in_the_middle_of_a_drag_loses_only_the_drag(shot: Path, sit_down: Callable) -> None:
