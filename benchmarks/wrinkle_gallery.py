@@ -136,7 +136,16 @@ def smile(face: Face) -> list[NDArray[np.uint8]]:
         [],
         [ScaleEdit(region=both, factor=2.0, **common)],
         [ScaleEdit(region=both, factor=0.0, **common)],
-        [PasteEdit(region=region, start=crow[1].point(len(crow[1]) // 2), goal=face.point(-6.0, -4.0), **common)],
+        [
+            PasteEdit(
+                region=region,
+                start=crow[1].point(len(crow[1]) // 2),
+                goal=face.point(-6.0, -4.0),
+                scale=1.4,
+                strength=0.9,
+                **common,
+            )
+        ],
         [ReshapeEdit(region=beside, curve=fold, goal=goal, **common)],
     ]
     seen = (face.chart[:, 0] < -0.5) & (face.chart[:, 0] > -9) & (np.abs(face.chart[:, 1] + 3) < 6)
