@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.feature_lines import FeatureLine, load_feature_lines, save_feature_lines, shortest_edge_path
+from toolkit.mesh.topology import unique_edges
 from viewer.modes.base import Mode
 from viewer.modes.undo import UndoStack
 from viewer.state.events import Key, Pointer
@@ -42,6 +43,7 @@ class FeatureLineMode(Mode):
         self._picks: tuple[int, ...] = ()
         self._side = "source"
         self._path: dict[tuple[str, tuple[int, ...], bool], Ids] = {}
+        self._edges: dict[str, tuple[Any, Ids]] = {}
         self._undo: UndoStack[_State] = UndoStack()
         self.chosen = -1
         self._name = ""
@@ -228,7 +230,7 @@ class FeatureLineMode(Mode):
         key = (side, picks, closed)
         if key not in self._path:
             mesh = self.app.data.source if side == "source" else self.app.data.target
-            if len(picks) < 2:
+            if len(picks) < 2 or self._is_path(side, picks, closed):
                 self._path[key] = np.array(picks, dtype=np.int64)
             elif len(picks) > 2 and not closed and (side, picks[:-1], False) in self._path:
                 last = shortest_edge_path(mesh.vertices, mesh.triangles, picks[-2:], False)
@@ -236,6 +238,17 @@ class FeatureLineMode(Mode):
             else:
                 self._path[key] = shortest_edge_path(mesh.vertices, mesh.triangles, picks, closed)
         return self._path[key]
+
+    def _is_path(self, side: str, picks: tuple[int, ...], closed: bool) -> bool:
+        """Whether consecutive vertices are joined by edges already, as in most files: nothing to search for then."""
+        mesh = self.app.data.source if side == "source" else self.app.data.target
+        if self._edges.get(side, (None, None))[0] is not mesh:
+            edges = unique_edges(mesh.triangles)
+            self._edges[side] = (mesh, edges[:, 0] * mesh.n_vertices + edges[:, 1])
+        ids = np.array(picks, dtype=np.int64)
+        pairs = np.sort(np.stack([ids, np.roll(ids, -1)], axis=1), axis=1)[: len(ids) if closed else len(ids) - 1]
+        keys, known = pairs[:, 0] * mesh.n_vertices + pairs[:, 1], self._edges[side][1]
+        return bool((known[np.minimum(np.searchsorted(known, keys), len(known) - 1)] == keys).all())
 
     def _finish(self, closed: bool) -> None:
         path = self._traced(self._side, self._picks, closed)

@@ -88,6 +88,7 @@ class App:
         self.modes: dict[str, Mode] = {mode.name: mode for mode in make_modes(self)}
         self.mode = self.modes["landmarks" if not self.data.has_registration else "look"]
         self.mode.enter()
+        self._warm_up()
         self.check_steps()
 
     # -- what changed ---------------------------------------------------------------------------------------------
@@ -226,10 +227,8 @@ class App:
         surface = self.surface(pane)
         known = self._pickers.get(surface.name)
         if known is None or known[0] is not surface:
-            if known is not None and known[0].triangles is surface.triangles:
-                picker = known[1].moved(surface.vertices)
-            else:
-                picker = Picker(surface.vertices, surface.triangles)
+            same = next((p for s, p in self._pickers.values() if s.triangles is surface.triangles), None)
+            picker = same.moved(surface.vertices) if same else Picker(surface.vertices, surface.triangles)
             known = self._pickers[surface.name] = (surface, picker)
         return known[1]
 
@@ -354,7 +353,7 @@ class App:
     def reload(self) -> None:
         """Stages were run: read the shot again."""
         self.shot = Shot(self.shot.path)
-        self.data = ShotData(self.shot)
+        self.data = ShotData(self.shot, self.data)
         self.play.n_frames, self.play.fps = self.data.n_frames, self.data.fps
         self._surfaces.clear()
         self._fields.clear()
@@ -369,9 +368,26 @@ class App:
 
     def result_written(self) -> None:
         """result/frames.npy is another: read it again."""
-        self.data = ShotData(self.shot)
+        self.data = ShotData(self.shot, self.data)
         self.faces_changed()
         self.check_steps()
+
+    def _warm_up(self) -> None:
+        """Read and prepare what the first click would wait for."""
+        _ = self.data.target  # before there is a window that could stand still
+        faces = [self.surface(pane) for pane in (0, 1)]
+
+        def done(pickers: list[Picker]) -> None:
+            for surface, picker in zip(faces, pickers, strict=True):
+                self._pickers.setdefault(surface.name, (surface, picker))
+
+        self.run_task(
+            "preparing",
+            lambda progress: [Picker(f.vertices, f.triangles) for f in faces],
+            done,
+            slot="warm",
+            quiet=True,
+        )
 
     # -- inside ---------------------------------------------------------------------------------------------------
 

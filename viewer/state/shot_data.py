@@ -33,11 +33,15 @@ class ShotData:
     """Reads a shot folder. Arrays are memory-mapped; nothing of it is changed here.
 
     ``source`` and ``target`` are the meshes as in the user's files: landmarks and lines refer to those. After a stage
-    was run, make a new one.
+    was run, make a new one from the one ``before``.
     """
 
-    def __init__(self, shot: Shot) -> None:
+    def __init__(self, shot: Shot, before: ShotData | None = None) -> None:
         self.shot = shot
+        # Reading meshes takes a second, in which the window would stand still; the user's files stay as they are.
+        for name in ("source", "target") if before is not None and _same_files(shot, before.shot) else ():
+            if name in vars(before):
+                vars(self)[name] = vars(before)[name]
         self.has_result = self._has("result", "frames", "triangles")
         self.has_registration = self._has("register", "target_vertices", "distance", "pose")
         self.has_bases = self._has("bases", "weights")
@@ -149,3 +153,9 @@ class ShotData:
         except (InputError, OSError, ValueError):
             return False
         return True
+
+
+def _same_files(one: Shot, other: Shot) -> bool:
+    """Whether both name the same meshes."""
+    a, b = one.config, other.config
+    return (a.source.reference, a.target.reference) == (b.source.reference, b.target.reference)
