@@ -84,6 +84,18 @@ class Picker:
         nearest = int(np.argmin(np.linalg.norm(corners - position, axis=1)))
         return Hit(triangle, _triple(barycentric), int(self.triangles[triangle][nearest]), _triple(position))
 
+    def draped(self, origin: Sequence[float] | Array, points: Array, reach: float) -> Array:
+        """Points (n, 3) laid on the surface that ``origin`` sees; left where it is farther off than ``reach``."""
+        start = np.asarray(origin, dtype=np.float64)
+        directions = points - start
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        rays = np.concatenate([np.broadcast_to(start, points.shape), directions], axis=1).astype(np.float32)
+        distance = self._scene.cast_rays(self._tensor(rays), nthreads=1)["t_hit"].numpy().astype(np.float64)
+        seen = np.isfinite(distance)
+        laid = start + np.where(seen, distance, 0.0)[:, None] * directions
+        near = seen & (np.linalg.norm(laid - points, axis=1) < reach)
+        return np.where(near[:, None], laid, points)
+
     def visible(self, ids: NDArray[np.integer], camera: Camera) -> NDArray[np.bool_]:
         """Mask ``(n,)`` of the vertices that the camera sees."""
         ids = np.asarray(ids)

@@ -59,7 +59,7 @@ class DetailEditMode(DetailSteps):
         self._index = -1
         self._before: DetailDraft | None = None
         self._last: Pointer | None = None
-        self._picker: Picker | None = None
+        self.picker: Picker | None = None
         self._radius: tuple[object, float] = (None, 0.0)
 
     # -- life -----------------------------------------------------------------------------------------------------
@@ -137,15 +137,15 @@ class DetailEditMode(DetailSteps):
         if not self._gesture:
             return False
         # Picked on the face as it is now: the wrinkles that change under the pointer don't move it.
-        self._before, self._picker, self._last = self.draft, self.app.picker(event.pane), None
+        self._before, self.picker, self._last = self.draft, self.app.picker(event.pane), None
         self.drag(event)
         return True
 
     def drag(self, event: Pointer) -> None:
         """Go on with the gesture."""
-        if not self._gesture or self._picker is None:
+        if not self._gesture or self.picker is None:
             return
-        event = replace(event, hit=self._picker.along(event.origin, event.direction) or event.hit)
+        event = replace(event, hit=self.picker.along(event.origin, event.direction) or event.hit)
         if event.hit is not None:
             self.under = (event.pane, event.hit)
         if self._gesture == "paint":
@@ -275,10 +275,10 @@ class DetailEditMode(DetailSteps):
         ground = self.grounds.ground
         if ground is None:
             return
-        assert self._picker is not None
+        assert self.picker is not None
         draft = self.begun()
         erase = "shift" in event.modifiers
-        dabs = self.brush.dabs(self.app, ground, self._last, event, erase, self._picker)
+        dabs = self.brush.dabs(self.app, ground, self._last, event, erase, self.picker)
         if not dabs:
             return
         self.draft = replace(draft, region=painted(ground.surface, dabs, draft.region))
@@ -306,7 +306,7 @@ class DetailEditMode(DetailSteps):
 
     def _drop_gesture(self) -> None:
         self._gesture, self._stroke, self.stroke_places = "", [], []
-        self._before, self._picker, self._last = None, None, None
+        self._before, self.picker, self._last = None, None, None
         self.app.touch("overlay")
 
     def _escape(self) -> bool:

@@ -352,3 +352,20 @@ def test_the_wheel_zooms_to_what_the_pointer_is_over(hand) -> None:
     app.handle(event)
     assert app.views[1].distance < 2
     assert app.pixel(1, under) == pytest.approx(at, abs=0.1)
+
+
+def test_the_brushes_ring_lies_on_the_face_and_does_not_fall_off_it(pose) -> None:
+    app = pose.app
+    app.handle(PanelInput("tool:fix"))
+    app.handle(PanelInput("brush", 8.0))
+    camera, picker = app.framing_camera(1), app.picker(1)
+    for vertex in (MIDDLE, 11 * 31 + 30):  # in the middle, and on the border
+        pose.send("hover", *pose.pixel_of(vertex))
+        (ring,) = app.mode.marks(1)
+        middle = app.surface(1).vertices[vertex]
+        away = np.linalg.norm(ring.points - middle, axis=1)
+        radius = 0.08 * app.data.target_framing.height
+        assert away.max() < 2.1 * radius
+        assert away.min() > 0.4 * radius
+        again = picker.draped(camera.position, ring.points, radius)
+        assert again == pytest.approx(ring.points, abs=1e-3 * radius)

@@ -65,7 +65,7 @@ def detail_marks(mode: DetailEditMode, pane: int) -> list[Mark]:
     if len(mode.stroke_places) > 1:
         marks.append(Curve(np.array(mode.stroke_places), GREEN if mode.tool == "goal" else YELLOW, 2.5))
     if mode.tool == "paint" and mode.under is not None and mode.under[0] == pane:
-        marks.append(mode.brush.ring(mode.app, pane, mode.under[1]))
+        marks.append(mode.brush.ring(mode.app, pane, mode.under[1], mode.picker))
     elif mode.tool in ("line", "goal") and mode.under is not None and mode.under[0] == pane:
         marks.append(Disc(mode.under[1].position, ORANGE, 3.0))
     return marks

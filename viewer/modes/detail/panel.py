@@ -64,16 +64,6 @@ def detail_rows(mode: DetailEditMode) -> list[Row]:
         Choice("action", "do", ACTIONS, draft.action),
         Buttons(tuple(Button(f"tool:{name}", words, on=name == mode.tool) for name, words in tools)),
     ]
-    rows += _region_rows(mode, draft)
-    rows += {"scale": _scale_rows, "paste": _paste_rows, "reshape": _reshape_rows, "gain": _gain_rows}[draft.action](
-        mode, draft
-    )
-    rows += _time_rows(mode, draft)
-    if mode.draft is not None and draft.missing:
-        rows.append(Note(f"Next: {draft.missing}.", "plain"))
-    if draft.instead_of is not None:
-        rows.append(Note(f"changes edit {draft.instead_of}", "quiet"))
-    rows.append(Entry("note", "note", draft.note))
     possible = mode.draft is not None and not mode.committing
     rows.append(
         Buttons(
@@ -83,6 +73,16 @@ def detail_rows(mode: DetailEditMode) -> list[Row]:
             )
         )
     )
+    if mode.draft is not None and draft.missing:
+        rows.append(Note(f"Next: {draft.missing}.", "plain"))
+    if draft.instead_of is not None:
+        rows.append(Note(f"changes edit {draft.instead_of}", "quiet"))
+    rows += _region_rows(mode, draft)
+    rows += {"scale": _scale_rows, "paste": _paste_rows, "reshape": _reshape_rows, "gain": _gain_rows}[draft.action](
+        mode, draft
+    )
+    rows += _time_rows(mode, draft)
+    rows.append(Entry("note", "note", draft.note))
     return rows
 
 

@@ -57,15 +57,7 @@ def pose_rows(mode: PoseEdit) -> list[Row]:
     draft = mode.draft or PoseDraft()
     rows: list[Row] = [
         Buttons(tuple(Button(f"tool:{name}", words, on=name == mode.tool) for name, words in TOOLS)),
-        Items("handle", tuple(_words(mode, i, h) for i, h in enumerate(draft.handles)), mode.selected, _LIST_ROWS),
     ]
-    if 0 <= mode.selected < len(draft.handles):
-        rows += _selected_rows(mode, draft.handles[mode.selected])
-    rows += _held_rows(mode, draft)
-    rows += _spread_rows(mode, draft)
-    if draft.instead_of is not None:
-        rows.append(Note(f"changes edit {draft.instead_of}", "quiet"))
-    rows.append(Entry("note", "note", draft.note))
     possible = mode.draft is not None and not mode.committing
     rows.append(
         Buttons(
@@ -75,6 +67,15 @@ def pose_rows(mode: PoseEdit) -> list[Row]:
             )
         )
     )
+    if draft.instead_of is not None:
+        rows.append(Note(f"changes edit {draft.instead_of}", "quiet"))
+    lines = tuple(_words(mode, index, handle) for index, handle in enumerate(draft.handles))
+    rows.append(Items("handle", lines, mode.selected, _LIST_ROWS))
+    if 0 <= mode.selected < len(draft.handles):
+        rows += _selected_rows(mode, draft.handles[mode.selected])
+    rows += _held_rows(mode, draft)
+    rows += _spread_rows(mode, draft)
+    rows.append(Entry("note", "note", draft.note))
     return rows
 
 
@@ -154,7 +155,7 @@ def _held_rows(mode: PoseEdit, draft: PoseDraft) -> list[Row]:
     rows: list[Row] = [Heading("Held still")]
     if mode.tool == "fix":
         rows.append(Slider("brush", "brush, % of the face", 100 * mode.brush.radius, 100 * SMALLEST, 100 * LARGEST))
-    words = f"{len(draft.fixed)} vertices painted" if draft.fixed else "nothing painted"
+    words = f"{len(draft.fixed):,} vertices painted" if draft.fixed else "nothing painted"
     if draft.fixed:
         words += _held_residual(mode, draft)
     rows.append(Note(words, "quiet"))

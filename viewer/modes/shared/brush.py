@@ -46,20 +46,14 @@ class Brush:
             for hit in stroke(picker, last, event, _STEP * self.radius * app.surface(event.pane).framing.height)
         ]
 
-    def ring(self, app: App, pane: int, hit: Hit) -> Curve:
-        """The brush's rim, laid on the face as the camera sees it."""
-        camera, surface = app.framing_camera(pane), app.surface(pane)
-        radius = self.radius * surface.framing.height
+    def ring(self, app: App, pane: int, hit: Hit, picker: Picker | None = None) -> Curve:
+        """The brush's rim, laid on the face as the camera sees it, or on the one that ``picker`` knows."""
+        camera = app.framing_camera(pane)
+        radius = self.radius * app.surface(pane).framing.height
         right, above, _ = camera.axes()
         angle = np.linspace(0, 2 * np.pi, _RING, endpoint=False)
-        middle = np.asarray(hit.position)
-        rim = middle + radius * (np.cos(angle)[:, None] * right + np.sin(angle)[:, None] * above)
-        origin, picker = np.asarray(camera.position), app.picker(pane)
-        for index, point in enumerate(rim):
-            found = picker.along(origin, (point - origin) / np.linalg.norm(point - origin))
-            if found is not None and np.linalg.norm(np.subtract(found.position, middle)) < 2 * radius:
-                rim[index] = found.position
-        return Curve(rim, WHITE, 1.6, closed=True)
+        rim = np.asarray(hit.position) + radius * (np.cos(angle)[:, None] * right + np.sin(angle)[:, None] * above)
+        return Curve((picker or app.picker(pane)).draped(camera.position, rim, 2 * radius), WHITE, 1.6, closed=True)
 
 
 def stroke(picker: Picker, last: Pointer | None, event: Pointer, spacing: float) -> list[Hit]:
