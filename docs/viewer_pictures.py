@@ -82,13 +82,15 @@ def picture(shot: Path, lines: list[dict[str, Any]], out: Path, folder: Path) ->
     command = [sys.executable, "-m", "viewer", str(shot), "--script", str(script), "--state", str(state)]
     command += ["--size", f"{SIZE[0]}x{SIZE[1]}"]
     environment = {**os.environ, "DISPLAY": DISPLAY, "MIEN_NO_PROBE": "1", "XDG_RUNTIME_DIR": str(folder)}
-    viewer = subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.DEVNULL)
+    viewer = subprocess.Popen(command, cwd=ROOT, env=environment)
     try:
         settled, until = 0, time.monotonic() + 300
-        while settled < 10 and time.monotonic() < until:
+        while settled < 6 and viewer.poll() is None and time.monotonic() < until:
             time.sleep(1)
             known = json.loads(state.read_text()) if state.exists() else {"busy": True, "script": True}
             settled = settled + 1 if not known["busy"] and not known["script"] else 0
+        if viewer.poll() is not None:
+            raise RuntimeError(f"the viewer ended with {viewer.returncode} before the picture {out.name} was made")
         grab(folder / "Xvfb_screen0").crop((0, 0, *SIZE)).save(out, quality=88)
         sys.stdout.write(f"{out}\n")
     finally:

@@ -99,4 +99,5 @@ def _with_vertex(line: dict[str, Any], app: App) -> dict[str, Any]:
     if line.get("event") != "pointer" or "vertex" not in line:
         return line
     values = dict(line)
-    return {**values, **point_at(app, int(values.get("pane", 0)), int(values.pop("vertex")))}
+    vertex = int(values.pop("vertex"))
+    return {**values, **point_at(app, int(values.get("pane", 0)), vertex)}

@@ -12,6 +12,7 @@ from toolkit.feature_lines import load_feature_lines
 from toolkit.mesh import TriangleMesh
 from toolkit.meshio import write_mesh
 from toolkit.shot import Shot
+from viewer.script import Player
 from viewer.state.app import App
 from viewer.state.events import Command, Key, PanelInput
 from viewer.state.marks import Curve, Disc
@@ -188,3 +189,18 @@ def test_stages_run_from_here_and_can_be_cancelled(user, raw: Shot, bump: Triang
     assert app.pair.name == "registration"
     assert app.field(1) is not None
     assert app.field(1).scale.unit == "the target's unit"
+
+
+def test_a_script_may_point_at_a_vertex(user, raw: Shot, tmp_path: Path) -> None:
+    script = tmp_path / "events.jsonl"
+    lines = [
+        {"event": "pointer", "kind": kind, "pane": pane, "vertex": vertex}
+        for pane, vertex in ((0, 300), (1, 120))
+        for kind in ("press", "release")
+    ]
+    script.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    player = Player(script)
+    while not player.finished:
+        player.play(user.app.handle, user.app)
+        user.wait()
+    assert pairs(raw) == [(300, 120)]
