@@ -43,20 +43,27 @@ def unfold(source: TriangleMesh, points: Array, skin: Mask, closest: Callable[[A
     closest : closest points of the target's surface to (V, 3)
     """
     adjacency = vertex_adjacency(source.triangles, len(points)).astype(bool).tocsr()
-    judged = skin[source.triangles].all(axis=1) & (_agreement(source.vertices, source.triangles) > _TURNED)
-    outside, laid = closest(points).normals, points
-    bad = judged & _turned(source.triangles, laid, outside)
+    triangles, outside, laid = source.triangles, closest(points).normals, points
+    judged = skin[triangles].all(axis=1) & (_agreement(source.vertices, triangles) > _TURNED)
+    bad = judged & _turned(triangles, laid, outside)
+    if not bad.any():
+        return points
+    # From here on only what lies round them is looked at.
+    near = _around(triangles[bad], adjacency, _FIRST_RINGS + 2 * _ROUNDS)
+    kept = near[triangles].any(axis=1)
+    triangles, bad = triangles[kept], bad[kept]
+    judged = judged[kept] & near[triangles].all(axis=1)
     loose = np.zeros(len(points), dtype=bool)
     for rings in range(_FIRST_RINGS, _FIRST_RINGS + _ROUNDS):
         if not bad.any():
             break
-        wider = loose | (_around(source.triangles[bad], adjacency, rings) & skin)
+        wider = loose | (_around(triangles[bad], adjacency, rings) & skin)
         tried = _relaid(source.vertices, laid, adjacency, wider)
-        left = judged & _turned(source.triangles, tried, outside)
+        left = judged & _turned(triangles, tried, outside)
         if np.count_nonzero(left) >= np.count_nonzero(bad):
             break
         loose, laid, bad = wider, tried, left
-    return _landed(source.triangles, laid, loose, closest, adjacency, judged) if loose.any() else points
+    return _landed(triangles, laid, loose, closest, adjacency, judged) if loose.any() else points
 
 
 def _landed(
