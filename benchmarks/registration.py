@@ -13,7 +13,7 @@ lines on both faces: rims of lids and lips, and the lines that an artist draws o
 wings of the nose, nasolabial folds, jaw, cheekbones, temples, from the corners of the mouth to chin and ears). Every
 pick on the target is the vertex nearest to the true point, as a careful user makes it: off by up to half an edge.
 
-``--floor`` prints what no smooth registration can go below instead; see ``_registration/floor.py``.
+``--floor`` prints instead how near a smooth displacement comes that knows the target's true surface; see ``_registration/floor.py``.
 """
 
 from __future__ import annotations
@@ -313,7 +313,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--level", type=int, default=2, choices=[0, 1, 2], help="resolution of the samples")
     parser.add_argument("--landmarks", nargs="+", type=int, default=[30, 45], choices=[30, 45])
     parser.add_argument("--ict", nargs=2, type=Path, metavar=("PERFORMER", "IDENTITY"), help="folders of the ICT pair")
-    parser.add_argument("--floor", action="store_true", help="print what no smooth registration can go below")
+    parser.add_argument("--floor", action="store_true", help="print how near an oracle with the true surface comes")
     parser.add_argument("--cache", type=Path, help="folder of the samples")
     parser.add_argument("--json", action="store_true", help="print one JSON object last")
     return parser

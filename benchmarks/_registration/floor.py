@@ -1,13 +1,15 @@
-"""How near any smooth registration can come: the oracle that knows the surface, and what the shapes themselves say.
+"""How near a smooth displacement can come: an oracle that knows the surface, and what the shapes themselves say.
 
 The oracle has the landmarks at their true points, the true lines (across, as lines slide along), and for every vertex
 the true surface: the tangent plane at its true point. It lacks only where in that plane the vertex lies, which is what
 smoothness has to answer. Of several stiffnesses, kinds of stretching and reference poses, the best is taken for each
-face in hindsight, which no method may. What it misses by, landmarks and smoothness cannot give.
+face in hindsight, which no method may. What it misses by, these landmarks and this kind of smoothness (bending and
+stretching of a displacement) cannot give; other landmarks, or a prior learned from faces, might.
 
 The second measure asks whether the surfaces' shape could. Relief is the mean height of the surface within 1.2 cm over
 the tangent plane, as a share of the radius. Where the oracle is off by more than 0.8 %, compare the source's relief
-with the target's at the true point and at the oracle's: where the latter fits better, shape leads away from the truth.
+with the target's at the true point and at the oracle's: where the latter fits better, this
+measure of shape leads away from the truth; where the true one fits better, there is something left to use.
 """
 
 from __future__ import annotations
