@@ -13,7 +13,8 @@ lines on both faces: rims of lids and lips, and the lines that an artist draws o
 wings of the nose, nasolabial folds, jaw, cheekbones, temples, from the corners of the mouth to chin and ears). Every
 pick on the target is the vertex nearest to the true point, as a careful user makes it: off by up to half an edge.
 
-``--floor`` prints instead how near a smooth displacement comes that knows the target's true surface; see ``_registration/floor.py``.
+``--floor`` prints instead how near a smooth displacement comes that knows the target's true surface; see
+``_registration/floor.py``.
 """
 
 from __future__ import annotations
