@@ -34,14 +34,16 @@ def events(shot: Path) -> dict[str, list[dict[str, Any]]]:
     """The events that lead to each picture."""
     from toolkit.shot import Shot
     from toolkit.stages.inputs import load_landmark_pairs
+    from viewer.state.shot_data import ShotData
 
     opened = Shot(shot)
     marks = load_landmark_pairs(opened)
     vertex = {name: int(v) for name, v in zip(marks.names, marks.source, strict=True)}
     corner = next(v for name, v in vertex.items() if "corner" in name and "mouth" in name)
     wrinkled = int(np.argmax(np.array(opened.array("decompose", "detail_energy"))))
+    pull = 0.03 * ShotData(opened).target_framing.height
     turned = {"azimuth": -24.0, "elevation": 6.0, "distance": 2.6}
-    close = {"azimuth": -14.0, "elevation": 2.0, "distance": 1.9, "shift": [0.0, -0.05, 0.0]}
+    close = {"azimuth": 14.0, "elevation": 2.0, "distance": 2.1, "shift": [0.0, -0.03, 0.0]}
 
     def command(name: str, argument: Any = None) -> dict[str, Any]:
         return {"event": "command", "name": name, "argument": argument}
@@ -56,9 +58,9 @@ def events(shot: Path) -> dict[str, list[dict[str, Any]]]:
             {"event": "pointer", "kind": "press", "pane": 1, "vertex": corner},
             {"event": "pointer", "kind": "release", "pane": 1, "vertex": corner},
             {"wait": 1},
-            {"event": "panel", "name": "dx", "value": 0.03},
+            {"event": "panel", "name": "dx", "value": 0.6 * pull},
             {"wait": 1},
-            {"event": "panel", "name": "dy", "value": 0.03},
+            {"event": "panel", "name": "dy", "value": pull},
             {"wait": 3},
             command("pair", "before_after"),
         ],

@@ -33,6 +33,7 @@ class Pane:
     def __init__(self, window: Any, app: App, index: int, send: Callable[[Pointer], None]) -> None:
         self.app, self.index, self._send = app, index, send
         self.widget, self.scene = native.new_scene(window)
+        self._zoom = window.theme.font_size / 16
         self.widget.set_on_mouse(self._mouse)
         self._face: DynamicMesh | None = None
         self._triangles: Any = None
@@ -88,7 +89,8 @@ class Pane:
         app = self.app
         camera, height = app.framing_camera(self.index), app.pane_sizes[self.index][1]
         marks = app.marks(self.index)
-        corners, colors = overlay.build(marks, camera, height)
+        # Marks are as large as on a plain screen also where a pixel is smaller.
+        corners, colors = overlay.build(marks, camera, round(height / self._zoom))
         if len(corners) > self._capacity or self._overlay is None:
             if self._overlay is not None:
                 self._overlay.remove()
