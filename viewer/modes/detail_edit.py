@@ -68,6 +68,10 @@ class DetailEditMode(DetailSteps):
         """Of the journal or of the file of drafts."""
         return DetailDraft.from_data(data, number)
 
+    def anew(self, draft: DetailDraft) -> DetailDraft:
+        """An edit of its own."""
+        return replace(draft, instead_of=None)
+
     def enter(self) -> None:
         """The tool is as it was."""
         self.choose_tool(self.tool)

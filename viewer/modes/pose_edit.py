@@ -81,6 +81,10 @@ class PoseEdit(OpenEdit[PoseDraft]):
         """Of the journal or of the file of drafts."""
         return PoseDraft.from_data(data, number)
 
+    def anew(self, draft: PoseDraft) -> PoseDraft:
+        """An edit of its own."""
+        return replace(draft, instead_of=None)
+
     def enter(self) -> None:
         """The tool is as it was."""
         self._choose_tool(self.tool)

@@ -137,3 +137,20 @@ def test_without_edits_there_is_a_word(hand) -> None:
     assert any("committed" in row.text for row in hand.app.rows() if isinstance(row, Note))
     hand.app.handle(Key("x"))
     assert "no edit is chosen" in hand.app.status_line()[0]
+
+
+def test_an_edit_deleted_while_it_is_open_becomes_one_of_its_own(history) -> None:
+    app = history.app
+    app.handle(PanelInput("edit", 0))
+    app.handle(PanelInput("open"))
+    history.wait()
+    app.choose_mode("history")
+    app.handle(PanelInput("edit", 0))
+    app.handle(PanelInput("remove"))
+    history.wait()
+    app.choose_mode("pose")
+    history.wait()
+    assert app.mode.draft.instead_of is None
+    app.handle(Key("enter"))
+    history.wait()
+    assert [edit.kind for edit in app.editing.edits] == ["detail", "pose"]

@@ -369,3 +369,23 @@ def test_the_brushes_ring_lies_on_the_face_and_does_not_fall_off_it(pose) -> Non
         assert away.min() > 0.4 * radius
         again = picker.draped(camera.position, ring.points, radius)
         assert again == pytest.approx(ring.points, abs=1e-3 * radius)
+
+
+def test_undo_of_a_draft_from_before_a_restart_gives_it_up_and_leaves_the_journal(pose, shot: Shot, opened) -> None:
+    at = pose.pixel_of(MIDDLE)
+    pose.drag(at, (at[0] + 25, at[1]))
+    pose.app.handle(Key("enter"))
+    pose.wait()
+    pose.drag((at[0] + 25, at[1]), (at[0] + 25, at[1] + 15))
+    other = opened(Shot(shot.path))
+    other.app.choose_mode("pose")
+    other.wait()
+    other.app.handle(Key("z", ("shift",)))
+    assert "nothing to redo" in other.app.status_line()[0]
+    other.app.handle(Key("z"))
+    other.wait()
+    assert other.app.mode.draft is None
+    assert len(edits(shot)) == 1
+    other.app.handle(Key("z"))
+    other.wait()
+    assert edits(shot) == ()

@@ -76,6 +76,10 @@ class OpenEdit(Mode, Generic[D]):
     def request(self, live: bool = False) -> None:
         """Ask the worker for the draft, which is not empty; ``live`` while a gesture goes on."""
 
+    @abstractmethod
+    def anew(self, draft: D) -> D:
+        """The draft as an edit of its own: the one that it was to change is gone."""
+
     def forget(self) -> None:
         """What was found out about the last draft is worth nothing any more."""
 
@@ -84,6 +88,10 @@ class OpenEdit(Mode, Generic[D]):
     def enter(self) -> None:
         """Show the open edit; a draft of another mode steps back."""
         if self.draft is not None:
+            numbers = [edit.number for edit in self.app.editing.edits]
+            if self.draft.instead_of is not None and self.app.editing.snapshot and self.draft.instead_of not in numbers:
+                self.draft = self.anew(self.draft)
+                self._keep()
             self.app.play.window = self.draft.window
         self.solve()
 
@@ -114,7 +122,7 @@ class OpenEdit(Mode, Generic[D]):
         if committed or (kept.instead_of is not None and kept.instead_of not in edits):
             file.write(self.kind, None)  # killed between the journal's line and this
             return
-        self.draft = kept
+        self.draft, self._undo = kept, [None]
         if self.app.mode is not self:
             self.app.say(f"an edit was open when the viewer closed; it is still there, under {self.title}")
 
@@ -173,7 +181,10 @@ class OpenEdit(Mode, Generic[D]):
         return self._step_back(self._undo, self._redo)
 
     def redo(self) -> bool:
-        """What undo took back."""
+        """What undo took back; the journal is left alone while an edit is open."""
+        if self.draft is not None and not self._redo:
+            self.app.say("there is nothing to redo in the open edit")
+            return True
         return self._step_back(self._redo, self._undo)
 
     def _step_back(self, source: list[D | None], goal: list[D | None]) -> bool:
