@@ -241,6 +241,9 @@ class History(Mode):
         mode = next((m for m in self.app.modes.values() if isinstance(m, OpenEdit) and m.kind == edit.kind), None)
         if mode is None:
             raise InputError(f'edits of the kind "{edit.kind}" cannot be opened here')
+        shown = self.app.editing.snapshot
+        if shown is not None and edit.number in shown.problems:
+            raise InputError(f"edit {edit.number} cannot be applied, so there is nothing to change", remedy="delete it")
         if not edit.on:
             raise InputError(f"edit {edit.number} is switched off", remedy="switch it on first")
         mode.open(edit)
@@ -271,7 +274,7 @@ class History(Mode):
         """Read from its data once: marks are drawn at every turn of the view."""
         known = self._sketches.get(edit.number)
         if known is None or known[0] is not edit:
-            known = self._sketches[edit.number] = (edit, sketch_of(edit))
+            known = self._sketches[edit.number] = (edit, sketch_of(edit, self.app.data.registered))
         return known[1]
 
     def _ask_residuals(self, number: int) -> None:
@@ -311,21 +314,24 @@ def told(residual: Residual) -> str:
     return f"all beyond {one.distance:.3g} held: it moves by {residual.left:.3g}"
 
 
-def sketch_of(edit: Edit) -> Sketch:
-    """What of an edit can be drawn; nothing of one that cannot be read."""
+def sketch_of(edit: Edit, rest: NDArray[np.floating]) -> Sketch:
+    """What of an edit can be drawn, on a face ``rest`` (V, 3); nothing of one that cannot be read."""
     try:
         if edit.kind == "pose":
             pose = PoseDraft.from_data(edit.data)
             ends = [(h.vertex,) if isinstance(h, PointConstraint) else h.vertices for h in pose.handles]
+            if max(pose.highest[1:]) >= len(rest):
+                return Sketch()
             held = np.array(pose.fixed, dtype=np.int64)
             return Sketch(tuple(pose.frames), tuple(int(v) for end in ends for v in end), held, np.ones(len(held)))
         detail = DetailDraft.from_data(edit.data)
     except InputError:
         return Sketch()
     region = detail.region
-    if region is None or not len(region):
+    if region is None or not len(region) or region.vertices[-1] >= len(rest):
         return Sketch(tuple(detail.frames))
-    middle = int(region.vertices[np.argmax(region.weights)])
+    places = rest[region.vertices]
+    middle = int(region.vertices[np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))])
     return Sketch(tuple(detail.frames), (middle,), region.vertices, region.weights)
 
 

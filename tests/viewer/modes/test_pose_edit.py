@@ -389,3 +389,19 @@ def test_undo_of_a_draft_from_before_a_restart_gives_it_up_and_leaves_the_journa
     other.app.handle(Key("z"))
     other.wait()
     assert edits(shot) == ()
+
+
+def test_a_draft_of_another_shot_is_not_taken_up(pose, shot: Shot, opened) -> None:
+    at = pose.pixel_of(MIDDLE)
+    pose.drag(at, (at[0] + 25, at[1]))
+    path = shot.path / "drafts.json"
+    kept = json.loads(path.read_text())
+    for name, value in (("vertex", 24 * 31), ("frame", 40)):
+        wrong = json.loads(json.dumps(kept))
+        wrong["pose"]["constraints"][0][name] = value
+        path.write_text(json.dumps(wrong))
+        other = opened(Shot(shot.path))
+        assert other.app.modes["pose"].draft is None
+        assert "does not fit" in other.app.status_line()[0]
+    path.write_text("{")
+    assert opened(Shot(shot.path)).app.modes["pose"].draft is None

@@ -104,6 +104,16 @@ class DetailDraft:
         """The key frame; the keys of a gain."""
         return [frame for frame, _ in self.gains] if self.action == "gain" else [self.frame]
 
+    @property
+    def highest(self) -> tuple[int, int, int]:
+        """The highest frame, vertex and triangle that it names."""
+        frames = [self.frame, *self.frames, *(self.window or ())]
+        vertex = int(self.region.vertices[-1]) if self._painted and self.region is not None else -1
+        points = [point for point in (self.start, self.goal) if point is not None]
+        triangles = [point.triangle for point in (*points, *self.line, *self.goal_line)]
+        triangles += [int(curve.triangles.max()) for curve in (self.curve, self.goal_curve) if curve is not None]
+        return max(frames), vertex, max(triangles, default=-1)
+
     def edit(self) -> DetailEdit:
         """For the solver; only where nothing is `missing`."""
         if self.action == "gain":

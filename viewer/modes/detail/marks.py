@@ -50,8 +50,9 @@ def detail_marks(mode: DetailEditMode, pane: int) -> list[Mark]:
     draft = mode.draft
     marks: list[Mark] = []
     if draft is not None:
-        marks += _line(mode, pane, draft.line, draft.curve, YELLOW)
-        if draft.action == "reshape":
+        if mode.show_region:
+            marks += _line(mode, pane, draft.line, draft.curve, YELLOW)
+        if mode.show_region and draft.action == "reshape":
             marks += _line(mode, pane, draft.goal_line, draft.goal_curve, GREEN)
         if draft.action == "paste" and draft.start is not None:
             marks.append(Disc(_place(mode, pane, draft.start), BLUE, 5.0, "from"))

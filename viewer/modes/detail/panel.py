@@ -19,7 +19,7 @@ TOOLS = (("paint", "Brush"), ("line", "Line"), ("place", "Place"), ("goal", "New
 KEYS = (
     ("b, c, p, n", "brush, line, place the copy, new line"),
     ("[, ], ctrl-wheel", "brush size"),
-    ("h", "hide or show the region"),
+    ("h", "hide or show the region and the lines"),
     ("delete", "take the last point of the line away"),
     ("enter, esc", "commit the edit, give it up"),
 )

@@ -54,6 +54,14 @@ class PoseDraft:
         return sorted({handle.frame for handle in self.handles})
 
     @property
+    def highest(self) -> tuple[int, int, int]:
+        """The highest frame, vertex and triangle that it names."""
+        frames, vertices = [-1, *self.frames, *(self.window or ())], [-1, *self.fixed]
+        for handle in self.handles:
+            vertices += [handle.vertex] if isinstance(handle, PointConstraint) else list(handle.vertices)
+        return max(frames), max(vertices), -1
+
+    @property
     def window(self) -> tuple[int, int] | None:
         """The frames whose weights may change; None all."""
         return self.parameters.window

@@ -39,6 +39,10 @@ class Draft(Protocol):
     def instead_of(self) -> int | None:
         """The committed edit that it changes."""
 
+    @property
+    def highest(self) -> tuple[int, int, int]:
+        """The highest frame, vertex and triangle that it names, -1 for none."""
+
     def data(self) -> dict[str, Any]:
         """As the journal holds it; not of an empty one."""
 
@@ -103,8 +107,17 @@ class OpenEdit(Mode, Generic[D]):
             return
         if self.draft is None:
             self._restore()
+        elif not self._fits(self.draft):
+            self.draft = None
+            self.app.say(f"the open {self.title.lower()} does not fit the shot any more and is given up", "bad")
         if self.app.mode is self:
             self.enter()
+
+    def _fits(self, draft: D) -> bool:
+        session = self.app.editing.session
+        assert session is not None
+        frame, vertex, triangle = draft.highest
+        return frame < session.n_frames and vertex < session.n_vertices and triangle < len(session.triangles)
 
     def _restore(self) -> None:
         """Take up the edit that was open when the viewer was closed or killed."""
@@ -119,6 +132,9 @@ class OpenEdit(Mode, Generic[D]):
             return
         edits = {edit.number: edit for edit in self.app.editing.edits}
         committed = not kept.empty and any(edit.data == kept.data() for edit in edits.values())
+        if not self._fits(kept):
+            self.app.say(f"the {self.title.lower()} that was open does not fit the shot any more", "bad")
+            return
         if committed or (kept.instead_of is not None and kept.instead_of not in edits):
             file.write(self.kind, None)  # killed between the journal's line and this
             return
@@ -264,6 +280,7 @@ class OpenEdit(Mode, Generic[D]):
             return False
         if self.committing:
             return False
+        self.app.say("")  # what was said of the last edit
         if self.app.play.playing:
             self.app.play.playing = False
             self.app.touch("timeline", "panel")
