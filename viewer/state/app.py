@@ -267,6 +267,8 @@ class App:
             self.touch("status")
         if self.play.advance(seconds):
             self._frame_changed()
+        if self.play.playing:
+            self.editing.build_ahead()
 
     def go_to_frame(self, frame: int) -> None:
         """Show another frame."""

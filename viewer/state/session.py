@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Editing", "Snapshot"]
 
 _CACHE_BYTES = 256 * 2**20
+_AHEAD = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +63,8 @@ class Editing:
         self.snapshot: Snapshot | None = None
         self.opening = False
         self.problem = ""
+        self._builder = ThreadPoolExecutor(1, "viewer-frames")
+        self._asked: dict[tuple[int, bool, int], Future[NDArray[np.float32]]] = {}
         self._frames: OrderedDict[tuple[int, bool, int], NDArray[np.float32]] = OrderedDict()
 
     # -- life -----------------------------------------------------------------------------------------------------
@@ -99,6 +103,7 @@ class Editing:
         """Forget the session: the shot's stages were run again."""
         self.session, self.snapshot, self.problem = None, None, ""
         self._frames.clear()
+        self._asked.clear()
 
     # -- frames ---------------------------------------------------------------------------------------------------
 
@@ -110,6 +115,19 @@ class Editing:
         """A frame of the automatic result."""
         return self._frame(frame, edited=False)
 
+    def build_ahead(self) -> None:
+        """While it plays: build the next edited frames in a thread, so that the window need not."""
+        shown, play = self.snapshot, self._app.play
+        if shown is None or not shown.changed:
+            return
+        for key in [key for key, future in self._asked.items() if future.done()]:
+            self._keep(key, self._asked.pop(key).result())
+        for step in range(1, _AHEAD + 1):
+            frame = (play.frame + step) % play.n_frames
+            key = (id(shown.shown), True, frame)
+            if key not in self._frames and key not in self._asked and len(self._asked) < _AHEAD:
+                self._asked[key] = self._builder.submit(shown.shown.frame, frame)
+
     def _frame(self, frame: int, edited: bool) -> NDArray[np.float32]:
         shown = self.snapshot
         if shown is None or (not shown.edits and not shown.has_draft):
@@ -117,12 +135,17 @@ class Editing:
         state = shown.shown if edited else shown.base
         key = (id(state), edited, frame)
         if key not in self._frames:
-            self._frames[key] = state.frame(frame)
-            most = max(2, _CACHE_BYTES // max(self._frames[key].nbytes, 1))
-            while len(self._frames) > most:
-                self._frames.popitem(last=False)
+            future = self._asked.pop(key, None)
+            # Waiting for one that is being built is no longer than building it.
+            self._keep(key, state.frame(frame) if future is None or future.cancel() else future.result())
         self._frames.move_to_end(key)
         return self._frames[key]
+
+    def _keep(self, key: tuple[int, bool, int], shape: NDArray[np.float32]) -> None:
+        self._frames[key] = shape
+        most = max(2 * _AHEAD, _CACHE_BYTES // max(shape.nbytes, 1))
+        while len(self._frames) > most:
+            self._frames.popitem(last=False)
 
     # -- calls ----------------------------------------------------------------------------------------------------
 
@@ -168,6 +191,9 @@ class Editing:
     def _take(self, snapshot: Snapshot) -> None:
         old = self.snapshot
         self.snapshot = snapshot
+        for future in self._asked.values():
+            future.cancel()
+        self._asked.clear()
         # Only frames of states that are still shown are worth keeping; ids of dead ones may come again.
         kept = {id(snapshot.shown), id(snapshot.base)}
         if old is not None:
