@@ -23,6 +23,7 @@ def write_state(path: Path, window: Window) -> None:
     size = window.window.size
     state = {
         "size": [size.width, size.height],
+        "warm": window.warm,
         "busy": app.worker.busy,
         "script": window.playing_script,
         "slowest_tick": round(window.slowest, 4),

@@ -106,6 +106,11 @@ class Window:
             native.save_scene(pane.scene, partial(got, index))
 
     @property
+    def warm(self) -> bool:
+        """Whether the first pictures are made: before that, clicks may be lost."""
+        return self._ticks > _WARM
+
+    @property
     def playing_script(self) -> bool:
         """Whether a script has lines left."""
         return self._player is not None and not self._player.finished
@@ -192,7 +197,7 @@ class Window:
             self._again = [when for when in self._again if when > now]
             for pane in self.panes:
                 pane.widget.force_redraw()
-        if self._ticks > _WARM:
+        if self.warm:
             self.slowest = max(self.slowest, time.monotonic() - now)
         if self._state_file is not None:
             self._write_state(bool(changes))
@@ -201,7 +206,7 @@ class Window:
     def _write_state(self, changed: bool) -> None:
         """After changes, and once more when they have been drawn."""
         busy = self.app.worker.busy
-        if changed or self._stale or busy != self._was_busy:
+        if changed or self._stale or busy != self._was_busy or self._ticks == _WARM + 1:
             self._stale, self._was_busy = changed, busy
             write_state(self._state_file, self)  # type: ignore[arg-type]
 

@@ -67,7 +67,8 @@ class Desk:
             self.process = subprocess.Popen(
                 command, cwd=ROOT, env={**self._environment, "MIEN_NO_PROBE": "1"}, stdout=log, stderr=log
             )
-        self.wait(lambda state: not state["busy"])
+        self.wait(lambda state: state["warm"])
+        time.sleep(0.3)
         self._window = self._xdotool("search", "--name", "^Mien").split()[0]
 
     # -- what is seen ---------------------------------------------------------------------------------------------
@@ -168,6 +169,7 @@ class Desk:
     def kill(self) -> None:
         self.process.kill()
         self.process.wait(10)
+        self._xdotool("mouseup", 1)  # else the next viewer finds the button down
 
 
 @pytest.fixture
