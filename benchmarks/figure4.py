@@ -126,9 +126,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--shot", type=Path, help="a shot of your own instead of the sample")
     parser.add_argument("--landmark", default="mouth_corner_l", help="the landmark to pull (default %(default)s)")
-    parser.add_argument(
-        "--share", type=float, default=0.045, help="how far, of the face's height (%(default)s)"
-    )
+    parser.add_argument("--share", type=float, default=0.045, help="how far, of the face's height (%(default)s)")
     parser.add_argument("--width", type=int, default=230, help="width of a picture in pixels (default %(default)s)")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "figure4.jpg", help="default docs/figure4.jpg")
     parser.add_argument("--json", action="store_true", help="end with one machine-readable line")

@@ -79,7 +79,8 @@ def test_extras_ride_with_the_head_on_both_faces(shot, tmp_path):
     config = shot.config
     place = {"source": [0, 0, 0.8], "target": [0, -2.4, 0]}
     for side, at in place.items():
-        write_mesh(tmp_path / f"{side}.ply", TriangleMesh(_ball_vertices() * 0.1 + at, open_views(shot).source.triangles))
+        ball = TriangleMesh(_ball_vertices() * 0.1 + at, open_views(shot).source.triangles)
+        write_mesh(tmp_path / f"{side}.ply", ball)
     save_config(
         shot.path / "shot.toml",
         replace(
