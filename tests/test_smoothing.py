@@ -13,6 +13,7 @@ from toolkit.smoothing import (
     SmoothingFilter,
     SmoothingParameters,
     apply_steps,
+    filter_coefficients,
     parameters_for_wavelength,
     smooth_with_pymeshlab,
 )
@@ -99,3 +100,8 @@ def test_the_paper_s_strength_is_a_wavelength() -> None:
     parameters = parameters_for_wavelength(2 * np.pi / turn, 1.0)
     assert parameters.steps == pytest.approx(40, abs=1)
     assert parameters.mu == pytest.approx(-0.53, abs=0.001)
+
+
+def test_steps_that_amplify_without_end_are_refused_instead_of_filling_the_memory() -> None:
+    with pytest.raises(InputError, match="shorter wavelength"):
+        filter_coefficients(20_000, 0.5, -0.53)

@@ -165,7 +165,16 @@ def filter_coefficients(steps: int, lambda_: float, mu: float) -> NDArray[np.flo
         # The last quarter must be rounding only, or higher terms are folded into lower ones.
         if degree < 0.75 * n_nodes:
             return full[: max(1, degree)]
+        if n_nodes >= _MOST_NODES:
+            raise InputError(
+                f"{steps} smoothing steps with lambda = {lambda_} and mu = {mu} amplify what they should keep",
+                remedy="ask for a shorter wavelength or fewer steps in [smoothing]",
+            )
         n_nodes *= 2
+
+
+_MOST_NODES = 2**16
+"""Rounding grows with the nodes: where this many do not settle a filter, no number of them does."""
 
 
 def apply_steps(
