@@ -142,17 +142,30 @@ def select_bases(
     chosen = np.array(frames, dtype=np.int64)
     squared = _squared_errors(positions, chosen, weights)
     if frames and errors[-1] > _EXACT * motion:
-        allowed = max(goal, _STEADY_COST * errors[-1])
-        inner, at_rest = gram[np.ix_(chosen, chosen)], energy <= _AT_REST * energy.max()
-        for strength in parameters.steadiness * _WEAKER:
-            steady = steady_weights(inner, gram[:, chosen], weights, float(strength), at_rest)
-            left = _squared_errors(positions, chosen, steady, exact=False)
-            error = float(np.sqrt(left.sum() * per_length))
-            if error <= allowed:
-                weights, squared, errors[-1] = steady, left, error
-                break
-    frame_errors = np.sqrt(squared / n_vertices)
-    return BasisSelection(chosen, weights, np.array(errors), frame_errors)
+        allowed = max(goal, _STEADY_COST * errors[-1]) ** 2 / per_length
+        weights, squared = _steadied(gram, positions, chosen, weights, squared, parameters.steadiness, allowed)
+        errors[-1] = float(np.sqrt(squared.sum() * per_length))
+    return BasisSelection(chosen, weights, np.array(errors), np.sqrt(squared / n_vertices))
+
+
+def _steadied(
+    gram: Array,
+    positions: Array,
+    chosen: NDArray[np.int64],
+    weights: Array,
+    squared: Array,
+    steadiness: float,
+    most: float,
+) -> tuple[Array, Array]:
+    """The steadiest weights whose squared errors sum to no more than ``most``, and these errors (T,)."""
+    energy = np.diag(gram)
+    inner, at_rest = gram[np.ix_(chosen, chosen)], energy <= _AT_REST * energy.max()
+    for strength in steadiness * _WEAKER:
+        steady = steady_weights(inner, gram[:, chosen], weights, float(strength), at_rest)
+        left = _squared_errors(positions, chosen, steady, exact=False)
+        if left.sum() <= most:
+            return steady, left
+    return weights, squared
 
 
 def _best_candidate(

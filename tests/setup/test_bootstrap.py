@@ -12,8 +12,9 @@ ROOT = Path(bootstrap.ROOT)
 
 
 @pytest.mark.parametrize("version", [(3, 10), (3, 11), (3, 12), (3, 13)])
-def test_supported_pythons_pass(version):
-    bootstrap.check_python(version)
+def test_supported_pythons_pass(version, monkeypatch):
+    monkeypatch.setattr(bootstrap.shutil, "which", lambda name: pytest.fail(f"looked for {name} in its place"))
+    assert bootstrap.check_python(version) is None
 
 
 @pytest.mark.parametrize("version", [(3, 9), (3, 14), (4, 0)])
@@ -85,8 +86,11 @@ def test_the_loaders_complaint_is_understood(text, name):
     assert bootstrap.missing_from_message(text) == name
 
 
-def test_the_proof_holds_here():
+def test_the_proof_holds_here_and_installs_nothing(monkeypatch):
+    installed = []
+    monkeypatch.setattr(bootstrap, "install_packages", installed.extend)
     bootstrap.prove(Path(sys.executable))
+    assert installed == []
 
 
 def test_a_failing_proof_says_which_library(monkeypatch, capsys):

@@ -100,6 +100,7 @@ class _NonFinite:
         self.first: tuple[int, int, int] | None = None
 
     def look(self, block: NDArray[np.float32], start: int) -> None:
+        """Take in frames (B, V, 3) from ``start`` on."""
         # One non-finite number makes the sum non-finite; only then is it worth looking for.
         with np.errstate(over="ignore", invalid="ignore"):
             suspects = np.flatnonzero(~np.isfinite(block.sum(axis=(1, 2))))
@@ -110,6 +111,7 @@ class _NonFinite:
                 self.first = self.first or (start + int(frame), int(broken[0]), len(broken))
 
     def findings(self) -> list[Finding]:
+        """One finding for all frames that were seen, if any is broken."""
         if self.first is None:
             return []
         frame, vertex, count = self.first

@@ -61,6 +61,7 @@ class _Ways:
         self._graph = sp.csr_matrix((np.tile(lengths, 2), both), shape=(n, n))
 
     def tight(self, start: SurfacePoint, end: SurfacePoint) -> Curve:
+        """The shortest curve on the surface between two points."""
         surface = self._surface
         a, b = surface.place(start), surface.place(end)
         way = self._along_edges(start, end)

@@ -29,10 +29,12 @@ class _Object:
     transforms: list[Any]
 
     def points(self, time: float) -> NDArray[np.floating]:
+        """Points (n, 3) at a time in seconds, in the scene's place."""
         points = np.array(memoryview(self.schema.getValue(_at(time)).getPositions()))
         return transform_points(points, self._world(time))
 
     def piece(self, time: float) -> Piece:
+        """Points and faces at a time in seconds, in the scene's place."""
         sample = self.schema.getValue(_at(time))
         counts = np.array(memoryview(sample.getFaceCounts()))
         indices = np.array(memoryview(sample.getFaceIndices()))

@@ -97,6 +97,7 @@ class _Lines:
 
     @classmethod
     def of(cls, data: bytes) -> _Lines:
+        """The lines of a file, continued ones joined; any line ends."""
         if b"\r" in data and b"\n" not in data:
             data = data.replace(b"\r", b"\n")
         if b"\\\n" in data or b"\\\r\n" in data:

@@ -68,10 +68,6 @@ class DetailEditMode(DetailSteps):
         """Of the journal or of the file of drafts."""
         return DetailDraft.from_data(data, number)
 
-    def anew(self, draft: DetailDraft) -> DetailDraft:
-        """An edit of its own."""
-        return replace(draft, instead_of=None)
-
     def enter(self) -> None:
         """The tool is as it was."""
         self.choose_tool(self.tool)
@@ -110,10 +106,6 @@ class DetailEditMode(DetailSteps):
     def tint(self, pane: int) -> Tint | None:
         """The region."""
         return detail_tint(self, pane) if shows_result(self.app, pane) else None
-
-    def key_frames(self) -> Sequence[int]:
-        """The key frame, or the keys of a gain."""
-        return self.draft.frames if self.draft is not None else ()
 
     def keys(self) -> Sequence[tuple[str, str]]:
         """For the help."""

@@ -81,10 +81,6 @@ class PoseEdit(OpenEdit[PoseDraft]):
         """Of the journal or of the file of drafts."""
         return PoseDraft.from_data(data, number)
 
-    def anew(self, draft: PoseDraft) -> PoseDraft:
-        """An edit of its own."""
-        return replace(draft, instead_of=None)
-
     def enter(self) -> None:
         """The tool is as it was."""
         self._choose_tool(self.tool)
@@ -129,10 +125,6 @@ class PoseEdit(OpenEdit[PoseDraft]):
     def tint(self, pane: int) -> Tint | None:
         """What is held, in blue."""
         return pose_tint(self, pane) if shows_result(self.app, pane) else None
-
-    def key_frames(self) -> Sequence[int]:
-        """Where handles are."""
-        return self.draft.frames if self.draft is not None else ()
 
     def keys(self) -> Sequence[tuple[str, str]]:
         """For the help."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from toolkit.errors import InputError
 from viewer.stages_process import run_in_process
@@ -62,28 +62,24 @@ def run(app: App, command: Command) -> None:
 
 def undo(app: App, _: Any = None) -> None:
     """Take back the last thing: of the mode, or of the journal."""
-    if app.mode.undo():
-        app.touch("overlay", "panel", "faces")
-        return
-    shown = app.editing.snapshot
-    if shown is None or shown.can_undo is None:
-        app.say("there is nothing to undo")
-        return
-    words = shown.can_undo
-    app.editing.call("undo", lambda session, progress: session.undo(), lambda _: app.say(f"undone: {words}"))
+    _step(app, "undo", "undone")
 
 
 def redo(app: App, _: Any = None) -> None:
     """Do again what was taken back."""
-    if app.mode.redo():
+    _step(app, "redo", "done again")
+
+
+def _step(app: App, name: Literal["undo", "redo"], done: str) -> None:
+    """Through what the mode remembers first, then through the journal."""
+    if getattr(app.mode, name)():
         app.touch("overlay", "panel", "faces")
         return
-    shown = app.editing.snapshot
-    if shown is None or shown.can_redo is None:
-        app.say("there is nothing to redo")
+    words = getattr(app.editing.snapshot, f"can_{name}", None)
+    if words is None:
+        app.say(f"there is nothing to {name}")
         return
-    words = shown.can_redo
-    app.editing.call("redo", lambda session, progress: session.redo(), lambda _: app.say(f"done again: {words}"))
+    app.editing.call(name, lambda session, _: getattr(session, name)(), lambda _: app.say(f"{done}: {words}"))
 
 
 def _run_stages(app: App, which: Any) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar
 
 from toolkit.editing import EditSession
 from toolkit.errors import InputError
@@ -21,7 +22,9 @@ __all__ = ["Draft", "OpenEdit"]
 
 
 class Draft(Protocol):
-    """An edit as far as it is made: a value that never changes."""
+    """An edit as far as it is made: a frozen dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
 
     @property
     def empty(self) -> bool:
@@ -80,10 +83,6 @@ class OpenEdit(Mode, Generic[D]):
     def request(self, live: bool = False) -> None:
         """Ask the worker for the draft, which is not empty; ``live`` while a gesture goes on."""
 
-    @abstractmethod
-    def anew(self, draft: D) -> D:
-        """The draft as an edit of its own: the one that it was to change is gone."""
-
     def forget(self) -> None:
         """What was found out about the last draft is worth nothing any more."""
 
@@ -94,7 +93,7 @@ class OpenEdit(Mode, Generic[D]):
         if self.draft is not None:
             numbers = [edit.number for edit in self.app.editing.edits]
             if self.draft.instead_of is not None and self.app.editing.snapshot and self.draft.instead_of not in numbers:
-                self.draft = self.anew(self.draft)
+                self.draft = replace(self.draft, instead_of=None)
                 self._keep()
             self.app.play.window = self.draft.window
         self.solve()
@@ -152,6 +151,10 @@ class OpenEdit(Mode, Generic[D]):
         if self.draft.frames:
             self.app.go_to_frame(self.draft.frames[0])
         self._keep()
+
+    def key_frames(self) -> Sequence[int]:
+        """The frames that the open edit is about."""
+        return self.draft.frames if self.draft is not None else ()
 
     # -- changes --------------------------------------------------------------------------------------------------
 
