@@ -16,7 +16,6 @@ import argparse
 import json
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +27,8 @@ import scipy.sparse as sp
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+from benchmarks._edits.faces import bells, made_up_face, unplaced  # noqa: E402
+from benchmarks._edits.timing import parser_for, timed  # noqa: E402
 from toolkit.decomposition import Decomposer  # noqa: E402
 from toolkit.detail_edit import (  # noqa: E402
     Dab,
@@ -43,11 +44,8 @@ from toolkit.detail_edit import (  # noqa: E402
 )
 from toolkit.detail_edit.propagation import region_laplacian  # noqa: E402
 from toolkit.details import Reconstruction  # noqa: E402
-from toolkit.mesh import TriangleMesh  # noqa: E402
 from toolkit.mesh.geometry import local_frames  # noqa: E402
-from toolkit.rigid import Similarity  # noqa: E402
 from toolkit.solve import factorise  # noqa: E402
-from toolkit.stabilisation import HeadMotion  # noqa: E402
 
 _NAMES = (
     "brush_s",
@@ -126,7 +124,8 @@ def measured(
     }
     numbers: dict[str, Any] = dict(shares)
     for name, one in work.items():
-        numbers[name], numbers[f"cpu_{name}"] = _median(one, runs)
+        times = timed(one, runs)
+        numbers[name], numbers[f"cpu_{name}"] = times.median, times.median_cpu
     return numbers
 
 
@@ -145,32 +144,14 @@ def made_up_take(options: argparse.Namespace, folder: Path) -> tuple[DetailTake,
         details[t, :, 1] = 0.2 * details[t, :, 2]
     details.flush()
     rng = np.random.default_rng(1)
-    bases = np.repeat(target.rest.smooth[None], options.bases, axis=0)
-    for k in range(options.bases):
-        x, y, size = rng.uniform(-5, 5), rng.uniform(-7, 7), rng.uniform(1.5, 4)
-        bell = np.exp(-((rest[:, 0] - x) ** 2 + (rest[:, 1] - y) ** 2) / size**2)
-        bases[k] += bell[:, None] * rng.normal(0, 0.6, 3)
+    bases = target.rest.smooth + bells(rest, options.bases, rng)
     weights = np.abs(rng.normal(0, 0.3, (options.frames, options.bases)))
-    still = HeadMotion(np.tile(np.eye(3), (options.frames, 1, 1)), np.zeros((options.frames, 3)))
-    place = Similarity(1.0, np.eye(3), np.zeros(3))
-    ones = np.ones(len(rest))
-    rebuild = Reconstruction(target, bases, weights, ones, still, place)
+    rebuild = unplaced(target, bases, weights)
     smooth, neighbour = target.rest.smooth, target.rest.neighbour
     frames0 = local_frames(smooth, triangles, neighbour)
     held = np.load(folder / "details.npy", mmap_mode="r")
-    return DetailTake(mesh, smooth, neighbour, frames0, held, ones, target.rest.detail), rebuild, weights
-
-
-def made_up_face(n_vertices: int) -> TriangleMesh:
-    """A domed sheet of 16 by 20."""
-    n = max(round(np.sqrt(n_vertices)), 8)
-    m = max(round(n_vertices / n), 8)
-    i, j = np.meshgrid(np.arange(n - 1), np.arange(m - 1), indexing="ij")
-    a = (i * m + j).ravel()
-    b, c, d = a + m, a + m + 1, a + 1
-    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.int32)
-    u, v = (x.ravel() for x in np.meshgrid(np.linspace(-8, 8, n), np.linspace(-10, 10, m), indexing="ij"))
-    return TriangleMesh(np.column_stack([u, v, 8 * np.exp(-((u / 9) ** 2) - (v / 11) ** 2)]), triangles)
+    take = DetailTake(mesh, smooth, neighbour, frames0, held, np.ones(len(rest)), target.rest.detail)
+    return take, rebuild, weights
 
 
 def nearest(take: DetailTake, count: int) -> Region:
@@ -193,26 +174,9 @@ def _shares(edit: ScaleEdit, take: DetailTake) -> dict[str, float]:
     return {"gradients_share_at_key": found[0], "gradients_share_beside": found[1]}
 
 
-def _median(work: Callable[[int], object], runs: int) -> tuple[float, float]:
-    """Median of the time by the clock and of the processor's, which other work on the machine does not add to."""
-    seconds, busy = [], []
-    for run in range(runs):
-        began, spent = time.perf_counter(), time.process_time()
-        work(run)
-        seconds.append(time.perf_counter() - began)
-        busy.append(time.process_time() - spent)
-    return float(np.median(seconds)), float(np.median(busy))
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--vertices", type=int, default=105_550, help="vertices of the face (default %(default)s)")
-    parser.add_argument("--frames", type=int, default=1300, help="frames of the take (default %(default)s)")
+    parser = parser_for(__doc__)
     parser.add_argument("--region", type=int, default=5000, help="vertices of the region (default %(default)s)")
-    parser.add_argument("--window", type=int, default=100, help="frames of the window (default %(default)s)")
-    parser.add_argument("--bases", type=int, default=28, help="bases K (default %(default)s)")
-    parser.add_argument("--runs", type=int, default=5, help="runs to take the median of (default %(default)s)")
-    parser.add_argument("--json", action="store_true", help="end with one machine-readable line")
     return parser
 
 
