@@ -16,8 +16,9 @@ from toolkit.pose_edit import (
     PointConstraint,
     PoseEditor,
 )
+from toolkit.pose_edit.banded import FrameRows
 from toolkit.pose_edit.constraints import rows_of
-from toolkit.pose_edit.weights_step import FrameRows, WeightsProblem, time_matrix
+from toolkit.pose_edit.weights_step import WeightsProblem, time_matrix
 
 KEY, TWIN = 18, 51  # frames of a similar expression in `face`
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from toolkit.errors import InputError
 from toolkit.mesh.topology import unique_edges
+from toolkit.pose_edit.banded import FrameRows
 from toolkit.pose_edit.bases_step import Responses, bases_metric
 from toolkit.pose_edit.constraints import (
     BeyondConstraint,
@@ -35,7 +36,7 @@ from toolkit.pose_edit.parameters import EditParameters
 from toolkit.pose_edit.regions import edge_lengths, vertices_beyond
 from toolkit.pose_edit.result import PoseEdit, Residual
 from toolkit.pose_edit.take import EditableTake, LowRankMoves
-from toolkit.pose_edit.weights_step import FrameRows, WeightsProblem, time_matrix
+from toolkit.pose_edit.weights_step import WeightsProblem, time_matrix
 from toolkit.progress import Progress, silent
 
 __all__ = ["PoseEditor"]

@@ -1,0 +1,237 @@
+"""Banded systems of the weights step, made anew in each of its steps.
+
+Unknowns are the weights ``(n, K)`` of n frames. Without fixed vertices each weight's curve is a chain of its own, five
+bands wide: all K of them run side by side here, LAPACK would take one after the other. Fixed vertices couple the
+weights of a frame, and time couples a frame with the next two: one system of 4 K + 1 bands, frame by frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.linalg import cholesky_banded
+from scipy.linalg.lapack import dpotrf, dpotrs
+
+from toolkit.compiled import njit
+
+__all__ = ["FrameRows", "SmallFactor", "System", "chain_bands", "frame_bands"]
+
+Array = NDArray[np.float64]
+Ids = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class FrameRows:
+    """``B``: row a sees only frame ``frames[a]`` of the window, ``(B u)_a = local[a] . u[frames[a]]``, local (R, K)."""
+
+    frames: Ids
+    local: Array
+
+    @cached_property
+    def distinct(self) -> Ids:
+        """The frames, each once, (F,)."""
+        return np.unique(self.frames)
+
+    @cached_property
+    def dense(self) -> Array:
+        """``B`` over these frames alone, (R, F K)."""
+        which = self.frames[:, None] == self.distinct
+        return np.asarray((which[:, :, None] * self.local[:, None]).reshape(len(self.frames), -1))
+
+    def of(self, change: Array) -> Array:
+        """``B u`` (R,)."""
+        return np.asarray(self.dense @ change[self.distinct].ravel())
+
+    def spread(self, values: Array, like: Array) -> Array:
+        """``B^T values`` (n, K)."""
+        result = np.zeros_like(like)
+        result[self.distinct] = (values @ self.dense).reshape(-1, like.shape[1])
+        return result
+
+
+def chain_bands(time: sp.csr_matrix, n_bases: int) -> Array:
+    """Lower bands (3, n, K) of ``Q`` for every weight's curve."""
+    n = time.shape[0]
+    bands = np.stack([np.pad(time.diagonal(offset), (0, min(offset, n))) for offset in range(3)])
+    return np.repeat(bands[:, :, None], n_bases, axis=2)
+
+
+def frame_bands(time: sp.csr_matrix, gram: Array) -> Array:
+    """Lower bands (2 K + 1, n K) of ``Q (x) I + I (x) G``."""
+    (n, _), n_bases = time.shape, len(gram)
+    bands = np.zeros((2 * n_bases + 1, n * n_bases))
+    for offset in range(n_bases):
+        bands[offset] = np.tile(np.pad(np.diagonal(gram, offset), (0, offset)), n)
+    for step in range(3):
+        bands[step * n_bases] += np.repeat(np.pad(time.diagonal(step), (0, min(step, n))), n_bases)
+    return bands
+
+
+class SmallFactor:
+    """Cholesky factor of a small positive definite matrix (R, R); SciPy's own call takes longer than LAPACK's work."""
+
+    def __init__(self, matrix: Array) -> None:
+        self._factor, failed = dpotrf(matrix, clean=False)
+        if failed:
+            raise np.linalg.LinAlgError("the constraints' matrix is not positive definite")
+
+    def solve(self, right: Array) -> Array:
+        """Solve for (R,) or (R, C)."""
+        return np.asarray(dpotrs(self._factor, right)[0])
+
+
+class System:
+    """``P + diag(extra) + B^T M^-1 B``: the banded part ``P`` factorised, the few rows by Woodbury's formula.
+
+    Parameters
+    ----------
+    bands : of ``P``, from `chain_bands` or `frame_bands`
+    rows, metric : ``B`` and ``M`` (R, R)
+    extra : (n, K), not negative, or None
+    stuck : (n, K), the weights that cannot move, or None
+    """
+
+    def __init__(
+        self,
+        bands: Array,
+        rows: FrameRows,
+        metric: Array,
+        extra: Array | None = None,
+        stuck: NDArray[np.bool_] | None = None,
+    ) -> None:
+        self._stuck, self._rows = stuck, rows
+        made = bands.copy()
+        if extra is not None:
+            made[0] += extra.reshape(made[0].shape)
+        if stuck is not None:
+            self._rows = FrameRows(rows.frames, np.where(stuck[rows.frames], 0.0, rows.local))
+            _strike(made, ~stuck.reshape(made[0].shape))
+        self._factor = _Chains(made) if made.ndim == 3 else _Frames(made)
+        self._small = SmallFactor(metric + self._factor.answers(self._rows))
+
+    def solve(self, right: Array) -> Array:
+        """Solve for one right-hand side (n, K); what cannot move stays zero."""
+        alone = self._factor.solve(right if self._stuck is None else np.where(self._stuck, 0.0, right))
+        pull = self._small.solve(self._rows.of(alone))
+        return np.asarray(alone - self._factor.solve(self._rows.spread(pull, alone)))
+
+
+def _strike(bands: Array, free: NDArray[np.bool_]) -> None:
+    """Make rows and columns of the identity for all that is not free, in place."""
+    for offset in range(len(bands)):
+        length = max(len(free) - offset, 0)
+        bands[offset, :length] *= free[:length] & free[len(free) - length :]
+    bands[0, ~free] = 1
+
+
+class _Chains:
+    """K curves side by side; ``bands`` (3, n, K) become ``L D L^T``."""
+
+    def __init__(self, bands: Array) -> None:
+        _factorise_chains(bands)
+        self._factor = bands
+
+    def solve(self, right: Array) -> Array:
+        solved = right[:, None].copy()
+        _substitute_chains(self._factor, solved, 0)
+        return solved[:, 0]
+
+    def answers(self, rows: FrameRows) -> Array:
+        """``B P^-1 B^T`` (R, R), from the columns of ``P^-1`` at the rows' frames."""
+        (_, n, n_bases), frames = self._factor.shape, rows.distinct
+        columns = np.zeros((n, len(frames), n_bases))
+        columns[frames, np.arange(len(frames))] = 1
+        _substitute_chains(self._factor, columns, int(frames.min(initial=n)))
+        seen = rows.local[:, None] * columns[rows.frames]
+        return np.asarray(seen.reshape(len(seen), -1) @ rows.dense.T)
+
+
+class _Frames:
+    """All weights of a frame together; ``bands`` (2 K + 1, n K)."""
+
+    def __init__(self, bands: Array) -> None:
+        factor = cholesky_banded(bands, overwrite_ab=True, lower=True, check_finite=False)
+        self._factor = np.ascontiguousarray(factor.T)
+
+    def solve(self, right: Array) -> Array:
+        solved = right.reshape(-1, 1).copy()
+        _forward(self._factor, solved, 0)
+        _backward(self._factor, solved)
+        return solved.reshape(right.shape)
+
+    def answers(self, rows: FrameRows) -> Array:
+        """``B P^-1 B^T = (L^-1 B^T)^T (L^-1 B^T)``, (R, R)."""
+        n_rows, n_bases = rows.local.shape
+        pulls = np.zeros((len(self._factor) // n_bases, n_bases, n_rows))
+        pulls[rows.frames, :, np.arange(n_rows)] = rows.local
+        halves = pulls.reshape(-1, n_rows)
+        _forward(self._factor, halves, int(rows.distinct.min(initial=0)) * n_bases)
+        return np.asarray(halves.T @ halves)
+
+
+@njit(cache=True, nogil=True)
+def _factorise_chains(bands):  # type: ignore[no-untyped-def]  # compiled
+    """``L D L^T`` of five bands, in place: (3, n, K) becomes 1 / D and L's two diagonals."""
+    _, n, count = bands.shape
+    # What the rows above take off the diagonal here, off the next one, and off the band beside it.
+    here, below, beside = np.zeros(count), np.zeros(count), np.zeros(count)
+    for i in range(n):
+        diagonal, first, second = bands[0, i], bands[1, i], bands[2, i]
+        for k in range(count):
+            inverse, near, far = 1 / (diagonal[k] - here[k]), first[k] - beside[k], second[k]
+            diagonal[k], first[k], second[k] = inverse, near * inverse, far * inverse
+            here[k] = below[k] + near * first[k]
+            below[k] = far * second[k]
+            beside[k] = near * second[k]
+
+
+@njit(cache=True, nogil=True)
+def _substitute_chains(factor, columns, start):  # type: ignore[no-untyped-def]  # compiled
+    """Solve in place for ``columns`` (n, C, K) that are zero before row ``start``; the rows before it are left so."""
+    n, n_columns, count = columns.shape
+    for i in range(start + 1, n):
+        first, second = factor[1, i - 1], factor[2, max(i - 2, 0)]
+        for c in range(n_columns):
+            x, near, far = columns[i, c], columns[i - 1, c], columns[max(i - 2, 0), c]
+            for k in range(count):
+                x[k] -= first[k] * near[k]
+            if i > start + 1:
+                for k in range(count):
+                    x[k] -= second[k] * far[k]
+    for i in range(n - 1, start - 1, -1):
+        inverse, first, second = factor[0, i], factor[1, i], factor[2, i]
+        # Beyond the end the bands are zero.
+        for c in range(n_columns):
+            x, near, far = columns[i, c], columns[min(i + 1, n - 1), c], columns[min(i + 2, n - 1), c]
+            for k in range(count):
+                x[k] = x[k] * inverse[k] - first[k] * near[k] - second[k] * far[k]
+
+
+@njit(cache=True, nogil=True)
+def _forward(factor, columns, first):  # type: ignore[no-untyped-def]  # compiled
+    """``L^-1 columns`` (N, C) in place, from row ``first`` on; ``factor`` (N, W) holds L's columns, diagonal first."""
+    n, width = factor.shape
+    count = columns.shape[1]
+    for i in range(first, n):
+        for c in range(count):
+            columns[i, c] /= factor[i, 0]
+        for j in range(1, min(width, n - i)):
+            for c in range(count):
+                columns[i + j, c] -= factor[i, j] * columns[i, c]
+
+
+@njit(cache=True, nogil=True)
+def _backward(factor, columns):  # type: ignore[no-untyped-def]  # compiled
+    """``L^-T columns`` (N, C) in place."""
+    n, width = factor.shape
+    count = columns.shape[1]
+    for i in range(n - 1, -1, -1):
+        for j in range(1, min(width, n - i)):
+            for c in range(count):
+                columns[i, c] -= factor[i, j] * columns[i + j, c]
+        for c in range(count):
+            columns[i, c] /= factor[i, 0]
