@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.blocks import scratch
+from toolkit.changed_details import ChangedDetails, DetailsChange
 from toolkit.coating_details import CoatingDetails
 from toolkit.decomposition import Decomposer
 from toolkit.errors import InputError
@@ -28,7 +29,6 @@ from toolkit.stabilisation import HeadMotion
 __all__ = [
     "BasesChange",
     "DetailParameters",
-    "DetailsChange",
     "Reconstruction",
     "detail_gain",
     "local_size_ratio",
@@ -82,20 +82,6 @@ class BasesChange(Protocol):
         """(U, K, 3)."""
 
 
-class DetailsChange(Protocol):
-    """A detail edit, solved: it acts in place on details that are scaled already, in the local frames."""
-
-    @property
-    def window(self) -> tuple[int, int]:
-        """First and last frame whose moving details it may change."""
-
-    def apply(self, details: NDArray[np.float32], start: int) -> None:
-        """Change ``g s d_t`` of some frames from ``start`` on, ``(B, V, 3)``."""
-
-    def apply_static(self, static: Array) -> None:
-        """Change ``e_0'`` (V, 3)."""
-
-
 class Reconstruction:
     """Everything that turns weights and motion details into frames of the target; any frame on demand.
 
@@ -129,13 +115,11 @@ class Reconstruction:
         moves = (bases - smooth)[:, order]  # (K, V, 3)
         self._moves = np.ascontiguousarray(moves.reshape(len(bases), -1).T, dtype=np.float32)
         self._own = target.rest.detail[order].astype(np.float32)
-        self._own_change = np.zeros_like(self._own)
-        self._gain_of = np.asarray(gain, dtype=np.float32)
-        self._gain = self._gain_of[order]
+        self._gain = np.asarray(gain, dtype=np.float32)[order]
         self._rotations, self._translations = _placed(motion, pose, self._origin)
         self._scale = pose.scale
         self._bases_changes: tuple[BasesChange, ...] = ()
-        self._details_changes: tuple[DetailsChange, ...] = ()
+        self._changed_details: ChangedDetails | None = None
         # Responses in the blocks' numbering; while an edit is dragged they stay the same from solve to solve.
         self._known: dict[int, tuple[Array, NDArray[np.float32]]] = {}
 
@@ -153,13 +137,8 @@ class Reconstruction:
         """
         other = copy.copy(self)
         other._weights = np.asarray(weights, dtype=np.float32)
-        other._bases_changes, other._details_changes = tuple(bases), tuple(details)
-        other._own_change = np.zeros_like(self._own)
-        if details:
-            static = np.array(self._target.rest.detail)
-            for change in details:
-                change.apply_static(static)
-            other._own_change = (static - self._target.rest.detail)[self._order].astype(np.float32)
+        other._bases_changes = tuple(bases)
+        other._changed_details = ChangedDetails(self._target, self._gain, details) if details else None
         return other
 
     def frames(self, start: int, stop: int, details: NDArray[np.float32], out: NDArray[np.float32]) -> None:
@@ -194,37 +173,15 @@ class Reconstruction:
         self, points: NDArray[np.float32], details: NDArray[np.float32], start: int, stop: int
     ) -> NDArray[np.float32]:
         """What details add to the large-scale ``points``, edits included, ``(V, 3, B)``."""
-        shift = self._rotated(points, details, self._gain, self._own)
-        if self._coating is not None:
-            shift = self._coating.displacement(points, shift, start, stop)
-        change = self._change(details, start, stop)
-        if change is not None:
-            # A displacement of its own, so that what it leaves alone stays bit for bit; as a coating it would leak.
-            shift += self._rotated(points, change, np.ones_like(self._gain), self._own_change)
-        return shift
-
-    def _change(self, details: NDArray[np.float32], start: int, stop: int) -> NDArray[np.float32] | None:
-        """What edits add to the scaled details of these frames, (B, V, 3); None where they add nothing at all."""
-        acting = [c for c in self._details_changes if c.window[0] < stop and c.window[1] >= start]
-        if not acting:
-            return np.zeros_like(details) if self._own_change.any() else None
-        plain = details * self._gain_of[:, None]
-        changed = plain.copy()
-        for change in acting:
-            change.apply(changed, start)
-        return np.asarray(changed - plain)
-
-    def _rotated(
-        self,
-        points: NDArray[np.float32],
-        details: NDArray[np.float32],
-        gain: NDArray[np.float32],
-        own: NDArray[np.float32],
-    ) -> NDArray[np.float32]:
-        """``G_t (own + gain details)`` as displacements, ``(V, 3, B)``."""
         shift = np.empty_like(points)
         block, normals = self._target.block, scratch("normals", points)
-        rotate_details(points, block.triangles, block.neighbour, normals, details, self._order, gain, own, shift)
+        faces, neighbour, order = block.triangles, block.neighbour, self._order
+        rotate_details(points, faces, neighbour, normals, details, order, self._gain, self._own, shift)
+        if self._coating is not None:
+            shift = self._coating.displacement(points, shift, start, stop)
+        if self._changed_details is not None:
+            # A displacement of its own also here: as a coating it would leak.
+            self._changed_details.add(shift, points, details, start, as_seen=self._coating is not None)
         return shift
 
     def _ordered(self, change: BasesChange) -> NDArray[np.float32]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from toolkit.contacts import ContactMap, ContactPairs
 from toolkit.decomposition import Decomposer
 from toolkit.mesh.geometry import local_frames
+from toolkit.mesh.patch import FramePatch
 from toolkit.progress import Progress, silent
 from toolkit.transfer import DeformationTransfer
 
@@ -27,20 +28,14 @@ class LocalDetails:
     """Detail displacements at a few vertices of the target, for whole shapes."""
 
     def __init__(self, target: Decomposer, vertices: NDArray[np.integer]) -> None:
-        triangles = np.asarray(target.mesh.triangles)
-        near = triangles[np.isin(triangles, vertices).any(axis=1)]
-        self._ids = np.unique(np.concatenate([near.ravel(), vertices, target.rest.neighbour[vertices]]))
-        self._triangles = np.searchsorted(self._ids, near)
-        self._at = np.searchsorted(self._ids, vertices)
-        # Frames are asked for at the given vertices only: elsewhere triangles are missing, any neighbour does.
-        self._neighbour = np.zeros(len(self._ids), dtype=np.int64)
-        self._neighbour[self._at] = np.searchsorted(self._ids, target.rest.neighbour[vertices])
+        self._patch = FramePatch.around(np.asarray(target.mesh.triangles), target.rest.neighbour, vertices)
         self._own = target.rest.detail[vertices]
         self.vertices = vertices
 
     def displacement(self, shape: Array, detail: Array) -> Array:
         """``G (e_0' + detail)`` (n, 3) at the vertices, for a smoothed shape (V, 3) and details (n, 3) there."""
-        frames = local_frames(shape[self._ids], self._triangles, self._neighbour)[self._at]
+        patch = self._patch
+        frames = local_frames(shape[patch.ids], patch.triangles, patch.neighbour)[patch.at]
         return np.asarray(np.einsum("vij,vj->vi", frames, self._own + detail))
 
 

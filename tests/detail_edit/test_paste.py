@@ -154,7 +154,7 @@ def test_static_details_are_pasted_into_static_ones(take: DetailTake, region: Re
     start, goal = _point(take, -0.35, 0.5), _point(take, 0.4, -0.3)
     change = solve_detail_edit(PasteEdit(region=region, frame=0, start=start, goal=goal, details="static"), take)
     static = take.static.copy()
-    change.apply_static(static)
+    change.apply_static(static, EVERYTHING)
     full = change.region.vertices[change.region.weights > 0.999]
     assert np.abs(static[full] - take.static[full]).max() > 1e-4
     assert np.abs(static[full]).max() < 0.005

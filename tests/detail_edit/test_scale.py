@@ -29,7 +29,7 @@ def _region(take: DetailTake) -> Region:
 def _edited(take: DetailTake, change: DetailChange) -> tuple[np.ndarray, np.ndarray]:
     before = take.unedited(0, take.n_frames - 1, EVERYTHING)
     after = before.copy()
-    change.apply(after, 0)
+    change.apply(after, 0, EVERYTHING)
     return before, after
 
 
@@ -114,7 +114,7 @@ def test_static_details_are_edited_alone(take: DetailTake) -> None:
     before, after = _edited(take, change)
     assert (after == before).all()
     static = take.static.copy()
-    change.apply_static(static)
+    change.apply_static(static, EVERYTHING)
     assert (static[region.vertices] == 0).all()
     assert (
         static[np.setdiff1d(EVERYTHING, change.vertices)] == take.static[np.setdiff1d(EVERYTHING, change.vertices)]
@@ -126,7 +126,7 @@ def test_blocks_and_single_vertices_are_edited_alike(take: DetailTake) -> None:
     _, after = _edited(take, change)
     for start in (0, 25, 55):
         block = take.unedited(start, min(start + 9, 60), EVERYTHING)
-        change.apply(block, start)
+        change.apply(block, start, EVERYTHING)
         assert (block == after[start : start + 10]).all()
     some = np.array([4000, 17, 2500, int(change.vertices[3])])
     assert (take.changed(change).dynamic(10, 50, some) == after[10:51, some]).all()

@@ -6,8 +6,8 @@ How a session calls it::
     region = within(take.surface, curve, distance)                # or painted, grown, shrunk, ...
     edit = ScaleEdit(region=region, frame=120, factor=0.0)        # remove the wrinkle of frame 120
     change = solve_detail_edit(edit, take)
-    change.apply(details, start)                                  # on blocks of g s d_t, in place
-    change.apply_static(static)                                   # on e_0'
+    change.apply(details, start, vertices)                        # on blocks of g s d_t at some vertices, in place
+    change.apply_static(static, vertices)                         # on e_0'
     further = take.changed(change)                                # edits stack
 
 What the user commits goes to the journal as `to_data(edit)`, and comes back by `from_data`.

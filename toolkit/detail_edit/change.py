@@ -13,6 +13,7 @@ __all__ = ["DetailChange"]
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
+_Places = Ids | slice
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,29 +36,14 @@ class DetailChange:
     static_offset: Array | None
     region: Region
 
-    def apply(self, details: NDArray[np.float32], start: int) -> None:
-        """Edit the scaled details g s d_t (B, V, 3) of frames from ``start`` on, in place; nothing else is touched."""
-        everything = len(self.vertices) == details.shape[1]
-        rows: slice | Ids = slice(None) if everything else self.vertices
-        for t in self._frames(start, len(details)):
-            details[t - start, rows] = self._edited(details[t - start, rows], t, slice(None))
-
-    def apply_at(self, values: NDArray[np.float32], start: int, vertices: Ids) -> None:
-        """As `apply`, on the details (B, n, 3) of some ``vertices`` (n,) alone."""
+    def apply(self, values: NDArray[np.floating], start: int, vertices: Ids) -> None:
+        """Edit the scaled details g s d_t (B, k, 3) of frames from ``start`` on at ``vertices`` (k,), in place."""
         rows, own = self._common(vertices)
-        if len(rows) == 0:
-            return
         for t in self._frames(start, len(values)):
             values[t - start, rows] = self._edited(values[t - start, rows], t, own)
 
-    def apply_static(self, static: NDArray[np.floating]) -> None:
-        """Edit the face's own details e_0' (V, 3), in place."""
-        self.apply_static_at(static, np.arange(len(static)))
-
-    def apply_static_at(self, values: NDArray[np.floating], vertices: Ids) -> None:
-        """As `apply_static`, on some ``vertices`` (n,) alone: ``values`` (n, 3)."""
-        if self.static_scale is None and self.static_offset is None:
-            return
+    def apply_static(self, values: NDArray[np.floating], vertices: Ids) -> None:
+        """Edit the face's own details e_0' (k, 3) at ``vertices`` (k,), in place."""
         rows, own = self._common(vertices)
         if self.static_scale is not None:
             values[rows] *= 1 + self.static_scale[own, None]
@@ -65,7 +51,9 @@ class DetailChange:
             values[rows] += self.static_offset[own]
 
     def touches(self, frame: int) -> bool:
-        """Whether a frame's motion details change."""
+        """Whether a frame changes."""
+        if self.static_scale is not None or self.static_offset is not None:
+            return True
         first, last = self.window
         return first <= frame <= last and (self.offset is not None or bool(self.activation[frame - first] != 0))
 
@@ -73,7 +61,7 @@ class DetailChange:
         first, last = self.window
         return range(max(start, first), min(start + count, last + 1))
 
-    def _edited(self, values: NDArray[np.float32], frame: int, own: slice | Ids) -> NDArray[np.float32]:
+    def _edited(self, values: NDArray[np.floating], frame: int, own: _Places) -> NDArray[np.floating]:
         k = frame - self.window[0]
         active = self.activation[k]
         if active != 0:
@@ -82,10 +70,10 @@ class DetailChange:
             values = values + self.offset[k, own]
         return values
 
-    def _common(self, vertices: Ids) -> tuple[Ids, Ids]:
+    def _common(self, vertices: Ids) -> tuple[_Places, _Places]:
         """Places in ``vertices`` of those that the edit knows, and their places here."""
-        if len(self.vertices) == 0:
-            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        if np.array_equal(vertices, self.vertices):  # as for a single edit
+            return slice(None), slice(None)
         found = np.minimum(np.searchsorted(self.vertices, vertices), len(self.vertices) - 1)
         rows = np.flatnonzero(self.vertices[found] == vertices)
         return rows, found[rows]

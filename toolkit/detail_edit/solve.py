@@ -127,7 +127,7 @@ def _by_gradients(edit: KeyedEdit, change: DetailChange, take: DetailTake) -> De
     """The same change of the key frame, carried through the window as the paper does."""
     before = take.dynamic(edit.frame, edit.frame, change.vertices)
     after = before.copy()
-    change.apply_at(after, edit.frame, change.vertices)
+    change.apply(after, edit.frame, change.vertices)
     surface = take.surface
     laplacian = region_laplacian(surface.triangles[surface.triangles_at(change.vertices)], change.vertices)
     asked = (after - before)[0].astype(np.float64)

@@ -86,14 +86,14 @@ class DetailTake:
         """As `unedited`, with the changes so far."""
         values = self.unedited(first, last, vertices)
         for change in self.changes:
-            change.apply_at(values, first, vertices)
+            change.apply(values, first, vertices)
         return values
 
     def static_at(self, vertices: Ids) -> Array:
         """The face's own detail with the changes so far, at some vertices (n,): ``(n, 3)``."""
         values = np.array(self.static[vertices], dtype=np.float64)
         for change in self.changes:
-            change.apply_static_at(values, vertices)
+            change.apply_static(values, vertices)
         return values
 
     def changed(self, *changes: DetailChange) -> DetailTake:

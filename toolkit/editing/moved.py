@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.blocks import block_ranges, block_size
+from toolkit.blocks import block_ranges
 from toolkit.editing.stack import State
 
 __all__ = ["moved_by", "n_moved"]
@@ -52,20 +52,19 @@ def _details(state: State) -> Array:
     farthest = np.zeros(opened.take.n_frames)
     if not state.changes:
         return farthest
-    own = opened.target.rest.detail
-    static = np.array(own)
+    vertices = np.unique(np.concatenate([change.vertices for change in state.changes]))
+    own = opened.target.rest.detail[vertices]
+    static = own.copy()
     for change in state.changes:
-        change.apply_static(static)
+        change.apply_static(static, vertices)
     farthest += np.sqrt(np.sum((static - own) ** 2, axis=1).max())
     first = max(min(change.window[0] for change in state.changes), 0)
     last = min(max(change.window[1] for change in state.changes), len(farthest) - 1)
-    gain = opened.gain.astype(np.float32)[:, None]
-    for start, stop in block_ranges(last + 1 - first, block_size(len(own))):
-        plain = opened.details[first + start : first + stop] * gain
+    gain = opened.gain[vertices, None].astype(np.float32)
+    for t in range(first, last + 1):
+        plain = opened.details[t : t + 1, vertices] * gain
         changed = plain.copy()
         for change in state.changes:
-            if change.window[0] < first + stop and change.window[1] >= first + start:
-                change.apply(changed, first + start)
-        squared = np.sum((changed - plain) ** 2, axis=2)
-        farthest[first + start : first + stop] += np.sqrt(squared.max(axis=1))
+            change.apply(changed, t, vertices)
+        farthest[t] += np.sqrt(np.sum((changed - plain) ** 2, axis=2).max())
     return farthest

@@ -70,16 +70,7 @@ class State:
             (weights != self.opened.take.weights[t]).any()
             or any(np.einsum("k,ukc->uc", weights, edit.coefficients).any() for edit in self.take.edits)
             or any(change.touches(t) for change in self.changes)
-            or self._static_changes
         )
-
-    @cached_property
-    def _static_changes(self) -> bool:
-        own = self.opened.target.rest.detail
-        changed = np.array(own)
-        for change in self.changes:
-            change.apply_static(changed)
-        return not np.array_equal(changed, own)
 
 
 @dataclass(frozen=True, eq=False)

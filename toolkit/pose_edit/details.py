@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from toolkit.changed_details import DetailsChange
 from toolkit.decomposition import Decomposer
-from toolkit.details import DetailsChange
 from toolkit.mesh.geometry import local_frames
+from toolkit.mesh.patch import FramePatch
 from toolkit.pose_edit.take import ShapeAt
 
 __all__ = ["VisibleDetails"]
@@ -37,12 +38,8 @@ class VisibleDetails:
         changes: Sequence[DetailsChange] = (),
     ) -> None:
         self._target, self._details, self._gain = target, details, gain
-        self._changes, self._static = tuple(changes), target.rest.detail
-        if changes:
-            self._static = np.array(target.rest.detail)
-            for change in changes:
-                change.apply_static(self._static)
-        self._patches: dict[int, tuple[Ids, Ids, int, int]] = {}
+        self._changes = tuple(changes)
+        self._patches: dict[int, FramePatch] = {}
 
     def changed(self, changes: Sequence[DetailsChange]) -> VisibleDetails:
         """The same with other changes."""
@@ -52,33 +49,20 @@ class VisibleDetails:
 
     def __call__(self, frame: int, vertices: Ids, shape_at: ShapeAt) -> Array:
         """Offsets (n, 3); ``shape_at`` gives the smoothed surface of that frame."""
-        local = self._static[vertices] + self._moving(frame, vertices)
+        local = self._target.rest.detail[vertices]
+        moving = np.asarray(self._details[frame, vertices], dtype=np.float64)[None] * self._gain[vertices, None]
+        for change in self._changes:
+            change.apply_static(local, vertices)
+            change.apply(moving, frame, vertices)
+        local += moving[0]
         turned = np.empty_like(local)
         for j, vertex in enumerate(vertices):
             turned[j] = self._frame_at(int(vertex), shape_at) @ local[j]
         return turned
 
-    def _moving(self, frame: int, vertices: Ids) -> Array:
-        acting = [change for change in self._changes if change.window[0] <= frame <= change.window[1]]
-        if not acting:
-            return np.asarray(self._details[frame, vertices], dtype=np.float64) * self._gain[vertices, None]
-        scaled = (self._details[frame : frame + 1] * self._gain[:, None]).astype(np.float32)
-        for change in acting:
-            change.apply(scaled, frame)
-        return np.asarray(scaled[0, vertices], dtype=np.float64)
-
     def _frame_at(self, vertex: int, shape_at: ShapeAt) -> Array:
-        ids, triangles, at, neighbour = self._patch(vertex)
-        neighbours = np.full(len(ids), neighbour)
-        return np.asarray(local_frames(shape_at(ids), triangles, neighbours)[at])
-
-    def _patch(self, vertex: int) -> tuple[Ids, Ids, int, int]:
-        """The triangles round a vertex in a numbering of their own, with its place and its frame neighbour's there."""
-        if vertex not in self._patches:
-            everywhere = np.asarray(self._target.mesh.triangles)
-            near = everywhere[(everywhere == vertex).any(axis=1)]
-            neighbour = int(self._target.rest.neighbour[vertex])
-            ids = np.unique(np.append(near.ravel(), [vertex, neighbour])).astype(np.int64)
-            at, beside = np.searchsorted(ids, [vertex, neighbour])
-            self._patches[vertex] = (ids, np.searchsorted(ids, near), int(at), int(beside))
-        return self._patches[vertex]
+        patch = self._patches.get(vertex)
+        if patch is None:
+            triangles, neighbour = np.asarray(self._target.mesh.triangles), self._target.rest.neighbour
+            patch = self._patches[vertex] = FramePatch.around(triangles, neighbour, np.array([vertex]))
+        return np.asarray(local_frames(shape_at(patch.ids), patch.triangles, patch.neighbour)[patch.at[0]])

@@ -57,7 +57,7 @@ STAGES: dict[str, Stage] = {
         ),
         Stage("bases", ("inputs", "decompose"), ("bases",), bases.work, version=2, reads=("lines.json",)),
         Stage("transfer", ("register", "bases"), ("smoothing", "transfer", "details"), transfer.work),
-        Stage("result", ("transfer",), ("smoothing", "details"), result.work, by_frames=True),
+        Stage("result", ("transfer",), ("smoothing", "details"), result.work, version=2, by_frames=True),
     )
 }
 
