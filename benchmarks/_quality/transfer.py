@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ from data.targets import Truth
 from toolkit.feature_lines import Opening, find_openings, load_feature_lines
 from toolkit.progress import Progress
 from toolkit.quality import (
+    Jitter,
     contact_gaps,
     crossing_triangles,
     flipped_triangles,
@@ -246,11 +248,21 @@ def _unrest_rows(case: Case, shot: Shot) -> list[Row]:
             measured(label + "over source, by how much each moves", found.whole),
             measured(label + "over source, typical part of the face", found.typical),
             measured(label + "over source, worst tenth of the parts", found.worst),
-            measured(label + "over source, second differences by size alone", found.bend),
+            *_second_differences(name, found),
         ]
     noise = np.random.default_rng(0).normal(scale=1e-5 * height, size=full.shape)
     label = "trembling of the source with noise of 1e-5 of the face's height: share"
     return [*rows, measured(label, 100 * unexplained_trembling(full, full + noise), "%")]
+
+
+def _second_differences(name: str, found: Jitter) -> list[Row]:
+    """The result's against their goal; a known answer's own say what the target's anatomy alone does to them."""
+    judge = partial(at_most, goal=1.0) if name == "result" else measured
+    label = f"second differences of the {name} over the source's, "
+    return [
+        judge(label + "scaled by the faces' size", found.bend),
+        judge(label + "by how fast each vertex moves", found.paced),
+    ]
 
 
 def _held_still(take: Take) -> Array:

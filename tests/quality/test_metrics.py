@@ -147,10 +147,12 @@ def test_larger_motion_is_not_jitter(acted):
     found = _beside(acted, larger, 3.0)
     assert (found.whole, found.typical, found.worst) == pytest.approx((1, 1, 1), abs=1e-6)
     assert found.bend == pytest.approx(1.6)
+    assert found.paced == pytest.approx(1)
     assert unexplained_trembling(acted, larger) == pytest.approx(unexplained_trembling(acted, acted))
     # Nor is more motion here and less there.
     uneven = rest + np.linspace(0.2, 2, 500)[:, None] * (acted - rest)
     assert _beside(acted, uneven).worst == pytest.approx(1, abs=0.1)
+    assert _beside(acted, uneven).paced == pytest.approx(1, abs=1e-9)
     assert unexplained_trembling(acted, uneven) < 0.01
 
 
@@ -159,6 +161,7 @@ def test_noise_on_every_frame_is_jitter(acted):
     found = _beside(acted, acted + noise)
     assert found.whole > 1.2
     assert found.typical > 2
+    assert found.paced > 1.01
     assert unexplained_trembling(acted, acted + noise) > 0.5
     assert unexplained_trembling(acted, acted) < 0.01
 

@@ -85,13 +85,15 @@ class Jitter:
     ``whole`` ratio of shiver over speed, over all vertices: what is left after scaling by how much each face moves;
     ``typical`` and ``worst`` the same for the median and the 90 % worst of the face's parts that are seen to move, so
     that a calm forehead is not judged by a busy mouth; ``bend`` plain ratio of second differences, scaled by the
-    faces' size alone, in which larger motion counts as unrest.
+    faces' size alone, in which larger motion counts as unrest: a lid that has farther to close, a longer jaw;
+    ``paced`` the same, but each vertex scaled by how fast it moves on either face.
     """
 
     whole: float
     typical: float
     worst: float
     bend: float
+    paced: float
 
 
 def unsteadiness(frames: Frames) -> Unsteadiness:
@@ -130,7 +132,7 @@ def jitter(
     whole = _rms(source.shiver) / max(_rms(source.speed), _TINY)
     if _rms(source.shiver) <= 1e-9 * height or not moves.any():  # it stands still, but for rounding
         none = 1.0 if _rms(result.shiver) <= least * scale else float("inf")
-        return Jitter(none, none, none, none)
+        return Jitter(none, none, none, none, none)
     # A part that is still on the source is held against the source's face as a whole.
     share = np.where(here.speed > least, here.shiver / np.maximum(here.speed, _TINY), whole)
     ratios = (there.shiver / np.maximum(there.speed, _TINY) / np.maximum(share, _TINY))[moves]
@@ -139,6 +141,7 @@ def jitter(
         float(np.median(ratios)),
         float(np.percentile(ratios, 90)),
         _rms(result.bend) / scale / _rms(source.bend),
+        _rms(result.bend * source.speed / np.maximum(result.speed, _TINY)) / _rms(source.bend),
     )
 
 
