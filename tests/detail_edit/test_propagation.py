@@ -5,7 +5,7 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from toolkit.detail_edit import DetailTake, Region, ScaleEdit, solve_detail_edit
+from toolkit.detail_edit import DetailTake, Region, ScaleEdit, propagation, solve_detail_edit
 from toolkit.detail_edit.propagation import GradientWeights, propagated, region_laplacian
 from toolkit.mesh import TriangleMesh
 from toolkit.mesh.topology import unique_edges
@@ -61,6 +61,18 @@ def test_the_fast_way_equals_the_direct_least_squares(bump: TriangleMesh, weight
     laplacian = region_laplacian(bump.triangles, vertices)
     change = propagated(laplacian, asked - unedited[3, vertices], (10, 18), 13, weights)
     assert np.abs(unedited[:, vertices] + change - direct).max() < 1e-8
+
+
+def test_it_takes_as_many_steps_as_it_needs(bump: TriangleMesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    vertices = np.flatnonzero(np.abs(bump.vertices[:, :2]).max(axis=1) < 0.8)
+    asked = np.random.default_rng(4).standard_normal((len(vertices), 3))
+    case = (region_laplacian(bump.triangles, vertices), asked, (0, 60), 20, GradientWeights())
+    change = propagated(*case)
+    monkeypatch.setattr(propagation, "_STEPS", 4)
+    monkeypatch.setattr(propagation, "_ROOM", 4)
+    assert np.abs(propagated(*case) - change).max() < 1e-9
+    monkeypatch.setattr(propagation, "_MOST_STEPS", 16)
+    assert np.abs(propagated(*case) - change).max() > 1e-5
 
 
 @pytest.mark.parametrize(("window", "frame"), [((4, 4), 4), ((4, 5), 5), ((0, 30), 0)])

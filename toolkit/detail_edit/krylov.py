@@ -1,4 +1,4 @@
-"""Lanczos' recurrence, compiled, on several starting vectors side by side."""
+"""Lanczos' recurrence, compiled, on three starting vectors side by side."""
 
 from __future__ import annotations
 
@@ -13,33 +13,34 @@ __all__ = ["lanczos_steps"]
 def lanczos_steps(indptr, indices, values, basis, alphas, betas, start, stop):
     """Steps ``start <= j < stop`` for a symmetric matrix in CSR form.
 
-    ``basis`` (J + 1, c, n) holds the vectors up to ``start`` and takes the next ones; ``alphas`` and ``betas`` (J, c)
+    ``basis`` (3, J + 1, n) holds the vectors up to ``start`` and takes the next ones; ``alphas`` and ``betas`` (3, J)
     are the diagonals and subdiagonals of the tridiagonal matrices.
     """
-    columns, n = basis.shape[1], basis.shape[2]
+    n = basis.shape[2]
+    together = np.empty((n, 3))  # so that each entry of the matrix is read once for all three
     for j in range(start, stop):
-        for c in range(columns):
-            current, after = basis[j, c], basis[j + 1, c]
-            alpha = 0.0
+        for c in range(3):
             for i in range(n):
-                total = 0.0
-                for p in range(indptr[i], indptr[i + 1]):
-                    total += values[p] * current[indices[p]]
-                after[i] = total
-                alpha += total * current[i]
-            alphas[j, c] = alpha
-            if j > 0:
-                before, beta = basis[j - 1, c], betas[j - 1, c]
-                for i in range(n):
-                    after[i] -= alpha * current[i] + beta * before[i]
-            else:
-                for i in range(n):
-                    after[i] -= alpha * current[i]
-            square = 0.0
+                together[i, c] = basis[c, j, i]
+        for i in range(n):
+            x, y, z = 0.0, 0.0, 0.0
+            for p in range(indptr[i], indptr[i + 1]):
+                k, value = indices[p], values[p]
+                x += value * together[k, 0]
+                y += value * together[k, 1]
+                z += value * together[k, 2]
+            basis[0, j + 1, i], basis[1, j + 1, i], basis[2, j + 1, i] = x, y, z
+        for c in range(3):
+            before, current, after = basis[c, max(j - 1, 0)], basis[c, j], basis[c, j + 1]
+            alpha, square = 0.0, 0.0
+            beta = betas[c, j - 1] if j > 0 else 0.0
             for i in range(n):
+                alpha += after[i] * current[i]
+            for i in range(n):
+                after[i] -= alpha * current[i] + beta * before[i]
                 square += after[i] * after[i]
             beta = np.sqrt(square)
-            betas[j, c] = beta
+            alphas[c, j], betas[c, j] = alpha, beta
             scale = 1.0 / beta if beta > 1e-300 else 0.0
             for i in range(n):
                 after[i] *= scale

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh_tridiagonal, solveh_banded
 
 from toolkit.detail_edit.krylov import lanczos_steps
+from toolkit.mesh.topology import unique_edges
 
 __all__ = ["GradientWeights", "propagated", "region_laplacian", "time_matrix"]
 
@@ -28,6 +29,7 @@ Ids = NDArray[np.int64]
 
 _TOLERANCE = 1e-11
 _STEPS = 40
+_ROOM = 320
 _MOST_STEPS = 4000
 
 
@@ -57,8 +59,7 @@ def region_laplacian(triangles: NDArray[np.integer], vertices: Ids) -> sp.csr_ma
 
     ``triangles`` (f, 3) must hold all triangles at the vertices.
     """
-    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
-    edges = np.unique(edges, axis=0).astype(np.int64)
+    edges = unique_edges(triangles)
     found = np.minimum(np.searchsorted(vertices, edges), len(vertices) - 1)
     inside = vertices[found] == edges
     n = len(vertices)
@@ -70,48 +71,48 @@ def region_laplacian(triangles: NDArray[np.integer], vertices: Ids) -> sp.csr_ma
 def propagated(
     laplacian: sp.csr_matrix, asked: Array, window: tuple[int, int], frame: int, weights: GradientWeights
 ) -> Array:
-    """Change ``(m, n, c)`` of every frame of the window from the one ``asked`` (n, c) for at the key frame."""
+    """Change ``(m, n, 3)`` of every frame of the window from the one ``asked`` (n, 3) for at the key frame."""
     shifts, modes = eigh_tridiagonal(*time_matrix(window, frame, weights))
     matrix = sp.csr_matrix(weights.gradient * laplacian)
     right = weights.key * modes[frame - window[0]]
     basis, diagonals, subdiagonals = _lanczos(matrix, asked, float(shifts[0]))
     changes = np.empty((len(shifts), *asked.shape))
-    lengths = np.sqrt((asked**2).sum(axis=0))
-    for c in range(asked.shape[1]):
+    for c, length in enumerate(np.linalg.norm(asked, axis=0)):
         # (T + s I)^-1 e_1 for every shift, by the eigenvectors of T; then from modes to frames.
-        values, vectors = eigh_tridiagonal(diagonals[:, c], subdiagonals[:, c])
-        first = lengths[c] * vectors[0]
-        spread = (right[:, None] * first) / (shifts[:, None] + values)
-        changes[:, :, c] = (modes @ spread @ vectors.T) @ np.ascontiguousarray(basis[:, c])
+        values, vectors = eigh_tridiagonal(diagonals[c], subdiagonals[c])
+        spread = (right[:, None] * length * vectors[0]) / (shifts[:, None] + values)
+        changes[:, :, c] = (modes @ spread @ vectors.T) @ basis[c]
     return changes
 
 
 def _lanczos(matrix: sp.csr_matrix, start: Array, smallest: float) -> tuple[Array, Array, Array]:
-    """Lanczos basis ``(j, c, n)`` from each column of ``start`` (n, c), with its tridiagonal matrices.
+    """Lanczos basis ``(3, j, n)`` from each column of ``start`` (n, 3), with its tridiagonal matrices.
 
     As many steps as the hardest system, the one of the ``smallest`` shift, takes to a residual of 1e-11. Lost
     orthogonality does no harm to solutions of linear systems: it only takes some steps more, as in conjugate gradients.
     """
-    n, columns = start.shape
-    basis = np.zeros((1, columns, n))
-    basis[0] = (start / np.maximum(np.sqrt((start**2).sum(axis=0)), 1e-300)).T
-    alphas, betas = np.zeros((0, columns)), np.zeros((0, columns))
-    while True:
-        done, steps = len(alphas), len(alphas) + _STEPS
-        basis = np.concatenate([basis, np.zeros((_STEPS, columns, n))])
-        alphas, betas = (np.concatenate([x, np.zeros((_STEPS, columns))]) for x in (alphas, betas))
+    basis, alphas, betas = np.empty((3, _ROOM + 1, len(start))), np.empty((3, _ROOM)), np.empty((3, _ROOM))
+    basis[:, 0] = (start / np.maximum(np.linalg.norm(start, axis=0), 1e-300)).T
+    for done in range(0, _MOST_STEPS, _STEPS):
+        steps = done + _STEPS
+        if steps > alphas.shape[1]:
+            basis, alphas, betas = (_longer(x) for x in (basis, alphas, betas))
         lanczos_steps(matrix.indptr, matrix.indices, matrix.data, basis, alphas, betas, done, steps)
-        if _residual(alphas, betas, smallest) < _TOLERANCE or steps >= _MOST_STEPS:
-            return basis[:-1], alphas, betas[:-1]
+        if _residual(alphas[:, :steps], betas[:, :steps], smallest) < _TOLERANCE:
+            break
+    return basis[:, :steps], alphas[:, :steps], betas[:, : steps - 1]
+
+
+def _longer(values: Array) -> Array:
+    """The same with room for twice as many steps (axis 1); memory that is not written to costs nothing."""
+    longer = np.empty((3, 2 * values.shape[1], *values.shape[2:]))
+    longer[:, : values.shape[1]] = values
+    return longer
 
 
 def _residual(alphas: Array, betas: Array, shift: float) -> float:
     """Largest residual of ``(T + shift I) y = e_1`` over the columns, as the Lanczos relation gives it."""
-    worst = 0.0
-    unit = np.zeros(len(alphas))
+    unit = np.zeros(alphas.shape[1])
     unit[0] = 1
-    for c in range(alphas.shape[1]):
-        banded = np.stack([alphas[:, c] + shift, betas[:, c]])
-        solved = solveh_banded(banded, unit, lower=True)
-        worst = max(worst, float(abs(betas[-1, c] * solved[-1])))
-    return worst
+    solved = [solveh_banded(np.stack([a + shift, b]), unit, lower=True) for a, b in zip(alphas, betas, strict=True)]
+    return max(float(abs(b[-1] * y[-1])) for b, y in zip(betas, solved, strict=True))
