@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["add_pose_options", "add_wrinkle_options", "edit_of_file", "frames_range", "pose_of", "wrinkle_of"]
 
-_NUMBERS = ("lambda_b", "lambda_w", "lambda_e", "handle", "reach", "smoothness", "tolerance")
+_NUMBERS = ("lambda_b", "lambda_w", "lambda_e", "handle", "reach", "contacts", "smoothness", "tolerance")
 
 
 class _AtFrame(argparse.Action):
@@ -263,6 +263,7 @@ _HELP = {
     "lambda_e": "weight of what is asked (10000)",
     "handle": "radius of the disc that a pull takes hold of, as a share of the face's diagonal (0.03)",
     "reach": "how far a pull carries over the surface, as a share of the same (0.1); 0 is no limit",
+    "contacts": "how much lids and lips that touch count when weights change; 0 lets them open (1)",
     "smoothness": "frames below which the curves prefer to bend slowly (5)",
     "tolerance": "the rounds end when one gains less than this share (0.05)",
 }

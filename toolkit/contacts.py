@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from toolkit.feature_lines import Opening
 
-__all__ = ["ContactMap", "ContactPairs", "find_contacts"]
+__all__ = ["TOUCHING", "ContactMap", "ContactPairs", "find_contacts"]
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
 
-# Gaps below this share of the opening's width count as touching.
-_TOUCHING = 0.02
+TOUCHING = 0.02
+"""Gaps below this share of the opening's width count as touching."""
+
 # A pair that is open at rest closes if its gap falls below this share of its own rest gap.
 _CLOSING = 0.25
 _STRIDE = 2
@@ -116,7 +117,7 @@ def _nearest_across(frames: NDArray[np.floating], side: Ids, other: Ids, corners
 def _with_closing(pairs: ContactPairs, frames: NDArray[np.floating]) -> ContactPairs:
     gaps = np.linalg.norm(pairs.gaps(frames), axis=2)
     rest, least = gaps[0], gaps.min(axis=0)
-    closes = (rest > _TOUCHING * pairs.widths(frames[0])) & (least < _CLOSING * rest)
+    closes = (rest > TOUCHING * pairs.widths(frames[0])) & (least < _CLOSING * rest)
     return ContactPairs(pairs.vertex, pairs.edge, pairs.share, closes, pairs.corners)
 
 
@@ -133,9 +134,9 @@ class ContactMap:
         self.target_rest = pairs.gaps(target)
         source_width, target_width = pairs.widths(source), pairs.widths(target)
         ratio = (target_width / np.maximum(source_width, 1e-30))[:, None, None]
-        eps = _TOUCHING * source_width
+        eps = TOUCHING * source_width
         squared = np.sum(self.source_rest**2, axis=1) + eps**2
-        open_on_target = np.linalg.norm(self.target_rest, axis=1) > _TOUCHING * target_width
+        open_on_target = np.linalg.norm(self.target_rest, axis=1) > TOUCHING * target_width
         eta = (pairs.closes & open_on_target)[:, None, None]
         bend = self.target_rest[:, :, None] - ratio * self.source_rest[:, :, None]
         self.matrix = (

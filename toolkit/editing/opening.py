@@ -12,10 +12,11 @@ from toolkit.details import Reconstruction
 from toolkit.editing.details import DetailSolver, detail_take
 from toolkit.editing.placement import Placement
 from toolkit.errors import InputError
-from toolkit.pose_edit import EditableTake
+from toolkit.pose_edit import EditableTake, TouchingPairs
 from toolkit.progress import Progress, silent
 from toolkit.shot import Shot
 from toolkit.stages import current_key
+from toolkit.stages.bases import load_pairs
 from toolkit.stages.decompose import load_motion
 from toolkit.stages.register import load_pose
 from toolkit.stages.result import open_reconstruction
@@ -62,7 +63,7 @@ def open_take(shot: Shot, progress: Progress = silent) -> OpenedTake:
     bases = np.array(shot.array("transfer", "bases"))
     rest = target.rest.smooth
     weights = np.array(shot.array("bases", "weights"), dtype=np.float64)
-    take = EditableTake(rest, bases - rest, weights, open_system(shot, target))
+    take = EditableTake(rest, bases - rest, weights, open_system(shot, target), contacts=_contacts(shot))
     progress("opening the shot", 3, 3)
     details = detail_take(shot, target)
     return OpenedTake(
@@ -75,3 +76,9 @@ def open_take(shot: Shot, progress: Progress = silent) -> OpenedTake:
         DetailSolver(shot, details),
         shot.config.details.method == "coating",
     )
+
+
+def _contacts(shot: Shot) -> TouchingPairs:
+    """Which lids and lips touch when, as on the source."""
+    gaps = np.array(shot.array("bases", "pair_gaps"))[1:]
+    return TouchingPairs.by_gaps(load_pairs(shot), gaps, np.array(shot.array("inputs", "source_vertices")))

@@ -25,6 +25,7 @@ from toolkit.pose_edit.constraints import (
     FixedConstraint,
     PointConstraint,
 )
+from toolkit.pose_edit.contacts import TouchingPairs
 from toolkit.pose_edit.data import from_data, to_data
 from toolkit.pose_edit.details import VisibleDetails
 from toolkit.pose_edit.parameters import EditParameters
@@ -44,6 +45,7 @@ __all__ = [
     "PoseEdit",
     "PoseEditor",
     "Residual",
+    "TouchingPairs",
     "VisibleDetails",
     "from_data",
     "to_data",

@@ -34,6 +34,9 @@ class EditParameters:
     Without it (0, the paper's) only what the take never moves holds the face, and one brow takes the whole face along
     (`toolkit.pose_edit.bases_step`).
 
+    ``contacts`` is how much lids and lips that touch count beside a constraint when the weights change
+    (`toolkit.pose_edit.contacts`); 0, the paper's, lets them open. Those that a constraint takes hold of are free.
+
     ``smoothness`` is the time in frames below which weights prefer to bend slowly; 0 is the paper's velocity term
     alone. ``coupled`` lets the weights step know that the bases will follow; False is the paper's plain alternation,
     which stops earlier and farther from the optimum. ``tolerance`` ends the rounds when one gains less than this share.
@@ -46,6 +49,7 @@ class EditParameters:
     lambda_e: float = 10000.0
     handle: float = 0.03
     reach: float = 0.1
+    contacts: float = 1.0
     smoothness: float = 5.0
     coupled: bool = True
     tolerance: float = 0.05
@@ -68,11 +72,11 @@ class EditParameters:
             raise InputError(
                 f"a reach of {self.reach} makes no sense", remedy="give a share like 0.1, or 0 for no limit"
             )
-        if not (self.smoothness >= 0 and self.tolerance >= 0 and self.most_rounds >= 1):
+        if not (self.contacts >= 0 and self.smoothness >= 0 and self.tolerance >= 0 and self.most_rounds >= 1):
             raise InputError(
-                f"smoothness = {self.smoothness}, tolerance = {self.tolerance}, most_rounds = {self.most_rounds} make "
-                "no sense",
-                remedy="give a smoothness and tolerance that are not negative, and at least one round",
+                f"contacts = {self.contacts}, smoothness = {self.smoothness}, tolerance = {self.tolerance}, "
+                f"most_rounds = {self.most_rounds} make no sense",
+                remedy="give none that is negative, and at least one round",
             )
 
     def frames(self, n_frames: int) -> tuple[int, int]:

@@ -1,18 +1,10 @@
-"""The alternating solver of Eq. 12.
-
-Each round changes the weights over the window, then the bases. In the paper's alternation each step takes the other's
-unknowns as they are; with strong constraints the first step then does everything and the second finds nothing left to
-do. Here the weights step knows how the bases will answer: eliminating them turns the constraints' weight ``lambda_e``
-into the metric ``M^-1`` of `bases_metric`, at no cost, since ``M`` is small. The rounds then are Gauss-Newton steps on
-the joint problem, and a handful of them reaches its optimum.
-"""
+"""Edits of one take: constraints to a joint problem, and its solution to what the user gets."""
 
 from __future__ import annotations
 
 import copy
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,8 +12,7 @@ from numpy.typing import NDArray
 
 from toolkit.errors import InputError
 from toolkit.mesh.topology import unique_edges
-from toolkit.pose_edit.banded import FrameRows
-from toolkit.pose_edit.bases_step import Responses, bases_metric
+from toolkit.pose_edit.bases_step import Responses
 from toolkit.pose_edit.constraints import (
     BeyondConstraint,
     Constraint,
@@ -33,6 +24,7 @@ from toolkit.pose_edit.constraints import (
 )
 from toolkit.pose_edit.handles import Handles
 from toolkit.pose_edit.parameters import EditParameters
+from toolkit.pose_edit.problem import EditProblem, EditState, solve_in_rounds
 from toolkit.pose_edit.regions import edge_lengths, vertices_beyond
 from toolkit.pose_edit.result import PoseEdit, Residual
 from toolkit.pose_edit.take import EditableTake, LowRankMoves
@@ -43,7 +35,6 @@ __all__ = ["PoseEditor"]
 
 Array = NDArray[np.float64]
 
-_MOST_HALVINGS = 8
 # Sets of held vertices whose factors are kept; one is about 200 MB at 100,000 vertices.
 _MOST_FACTORS = 2
 
@@ -99,7 +90,7 @@ class PoseEditor:
         change = np.zeros_like(problem.weights.lower)
         if warm and self._last is not None and self._last[0] == parameters:
             change = np.maximum(self._last[1], problem.weights.lower)
-        state, energies = _iterate(problem, change, parameters, progress)
+        state, energies = solve_in_rounds(problem, change, parameters, progress)
         self._last = (parameters, state.change)
         residuals = self._residuals(constraints, resolved, rows, problem, state)
         return self._result(rows, problem, state, residuals, energies)
@@ -117,7 +108,7 @@ class PoseEditor:
                 found.append(constraint)
         return found
 
-    def _problem(self, rows: ConstraintRows, parameters: EditParameters, window: tuple[int, int]) -> _Problem:
+    def _problem(self, rows: ConstraintRows, parameters: EditParameters, window: tuple[int, int]) -> EditProblem:
         take = self.take
         first, last = window
         n = last - first + 1
@@ -135,11 +126,12 @@ class PoseEditor:
         lambda_w = parameters.lambda_w * (self._reach / self._edge) ** 2 * n / 4
         time = lambda_w * time_matrix(n, first > 0, last < take.n_frames - 1, parameters.smoothness)
         gram = None if not len(rows.held) else lambda_e * rows.held_weight * self._held_gram(rows.held)
+        opening = self._opening(rows, window, lambda_e * parameters.contacts)
         moves = np.einsum("au,kuc->akc", rows.combination, take.moves_at(rows.vertices))
         coupling = np.zeros((len(rows), len(rows)))
         if responses is not None:
             coupling = rows.combination @ responses[rows.vertices] @ rows.combination.T
-        return _Problem(
+        return EditProblem(
             rows=rows,
             moves=moves,
             coupling=coupling,
@@ -147,7 +139,7 @@ class PoseEditor:
             original=take.weights,
             first=first,
             inside=inside,
-            weights=WeightsProblem(time, gram, -take.weights[first : last + 1]),
+            weights=WeightsProblem(time, gram, -take.weights[first : last + 1], opening),
             lambda_b=parameters.lambda_b,
             lambda_e=lambda_e,
         )
@@ -184,11 +176,18 @@ class PoseEditor:
             self._gram = (held, moved @ moved.T)
         return self._gram[1]
 
+    def _opening(self, rows: ConstraintRows, window: tuple[int, int], weight: float) -> Array | None:
+        """What opening closed lids and lips costs, (n, K): not of those that a constraint takes hold of."""
+        contacts = self.take.contacts
+        if contacts is None or weight == 0:
+            return None
+        return weight * contacts.let_go(rows.vertices).costs(self.take.moves_at(contacts.pairs.vertices), *window)
+
     def _result(
         self,
         rows: ConstraintRows,
-        problem: _Problem,
-        state: _State,
+        problem: EditProblem,
+        state: EditState,
         residuals: tuple[Residual, ...],
         energies: list[float],
     ) -> PoseEdit:
@@ -206,8 +205,8 @@ class PoseEditor:
         constraints: Sequence[Constraint],
         resolved: Sequence[Constraint],
         rows: ConstraintRows,
-        problem: _Problem,
-        state: _State,
+        problem: EditProblem,
+        state: EditState,
     ) -> tuple[Residual, ...]:
         """One for each constraint; ``resolved`` are the same with their vertices named."""
         left = np.sqrt(np.sum(problem.residual(state) ** 2, axis=1))
@@ -228,115 +227,6 @@ class PoseEditor:
         moved = self.take.moves_at(ids).reshape(self.take.n_bases, -1)
         squared = np.einsum("tk,kl,tl->t", change, moved @ moved.T, change)
         return float(np.sqrt(max(float(squared.max(initial=0)), 0.0) / max(len(ids), 1)))
-
-
-@dataclass(frozen=True)
-class _State:
-    """A change of the weights (n, K) with the bases that suit it best: ``row_moves`` (R, K, 3) their coefficients."""
-
-    change: Array
-    row_moves: Array
-    energy: float
-
-
-@dataclass(frozen=True)
-class _Problem:
-    """Everything that stays the same over the rounds; ``moves`` (R, K, 3) are the bases' displacements at the rows."""
-
-    rows: ConstraintRows
-    moves: Array
-    coupling: Array
-    responses: Array | None
-    original: Array
-    first: int
-    inside: NDArray[np.bool_]
-    weights: WeightsProblem
-    lambda_b: float
-    lambda_e: float
-
-    def weights_at(self, change: Array) -> Array:
-        """The edited weights in each row's frame, ``(R, K)``."""
-        weights = self.original[self.rows.frames].copy()
-        weights[self.inside] += change[self.rows.frames[self.inside] - self.first]
-        return weights
-
-    def misfit(self, weights_at: Array) -> Array:
-        """What the rows still ask for with these weights and the unedited bases, ``(R, 3)``."""
-        return np.asarray(self.rows.goals - np.einsum("ak,akc->ac", weights_at, self.moves))
-
-    def metric(self, weights_at: Array, coupled: bool = True) -> Array:
-        """``M`` (R, R)."""
-        coupling = self.coupling if coupled else np.zeros_like(self.coupling)
-        return bases_metric(weights_at, coupling, self.rows.weights, self.lambda_b, self.lambda_e)
-
-    def moves_with(self, row_moves: Array) -> Array:
-        """The edited bases' displacements at the rows, ``(R, K, 3)``."""
-        return np.asarray(self.moves + np.einsum("ab,bkc->akc", self.coupling, row_moves))
-
-    def residual(self, state: _State) -> Array:
-        """What the rows still ask for after the edit, ``(R, 3)``."""
-        weights_at = self.weights_at(state.change)
-        return np.asarray(self.rows.goals - np.einsum("ak,akc->ac", weights_at, self.moves_with(state.row_moves)))
-
-    def with_bases(self, change: Array) -> _State:
-        """The bases step: the best bases for a change of the weights."""
-        weights_at = self.weights_at(change)
-        misfit = self.misfit(weights_at)
-        pull = np.linalg.solve(self.metric(weights_at), misfit)
-        row_moves = np.zeros_like(self.moves)
-        if self.responses is not None:
-            row_moves = weights_at[:, :, None] * pull[:, None, :] / self.lambda_b
-        energy = float(np.sum(misfit * pull)) + self.weights.cost(change)
-        return _State(change, row_moves, energy)
-
-    def better_weights(self, state: _State, coupled: bool) -> Array:
-        """The weights step, ``(n, K)``."""
-        weights_at, moves = self.weights_at(state.change), self.moves_with(state.row_moves)
-        # Rows outside the window see no change of weights, yet pull on the bases with the others.
-        frames = np.where(self.inside, self.rows.frames - self.first, 0)
-        local = np.where(self.inside[:, None, None], moves, 0.0).transpose(0, 2, 1).reshape(-1, moves.shape[1])
-        rows = FrameRows(np.repeat(frames, 3), local)
-        now = np.einsum("ak,akc->ac", weights_at - self.original[self.rows.frames], moves)
-        left = self.misfit(weights_at) if coupled else self.residual(state)
-        metric: Array = np.kron(self.metric(weights_at, coupled), np.eye(3)).astype(np.float64)
-        return self.weights.solve(rows, (left + now).ravel(), metric, state.change)
-
-
-def _iterate(
-    problem: _Problem, change: Array, parameters: EditParameters, progress: Progress
-) -> tuple[_State, list[float]]:
-    """Rounds until one gains less than the tolerance; the energy never rises."""
-    state = problem.with_bases(change)
-    energies = [state.energy]
-    if parameters.mode == "bases":
-        return problem.with_bases(np.zeros_like(change)), energies
-    for done in range(parameters.most_rounds):
-        progress("solving the edit", done, parameters.most_rounds)
-        step = problem.better_weights(state, parameters.coupled) - state.change
-        better = _along(problem, state, step)
-        gain = state.energy - better.energy
-        state = better
-        energies.append(state.energy)
-        if gain <= parameters.tolerance * state.energy:
-            break
-    progress("solving the edit", parameters.most_rounds, parameters.most_rounds)
-    return state, energies
-
-
-def _along(problem: _Problem, state: _State, step: Array) -> _State:
-    """The best of the step and its halves; the state itself if none is better.
-
-    The constraints are products of weights and bases, so a whole step may go too far. A trial costs next to nothing.
-    """
-    best = state
-    for _ in range(_MOST_HALVINGS):
-        trial = problem.with_bases(state.change + step)
-        if trial.energy < best.energy:
-            best = trial
-        elif best is not state:
-            break
-        step = step / 2
-    return best
 
 
 def _reach(take: EditableTake) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from toolkit.pose_edit.contacts import TouchingPairs
 from toolkit.solve import Factor
 
 __all__ = ["DetailOffset", "EditableTake", "LowRankMoves", "ShapeAt", "TransferSystem"]
@@ -67,6 +68,7 @@ class EditableTake:
     system : the transfer's normal matrix and factor
     detail_offset : what the user sees is the smoothed surface plus this (`VisibleDetails`); nothing by default
     edits : earlier edits of the bases, kept as low-rank additions to ``moves``
+    contacts : which lids and lips touch when, if that is known
     """
 
     rest: Array
@@ -75,6 +77,7 @@ class EditableTake:
     system: TransferSystem
     detail_offset: DetailOffset | None = None
     edits: tuple[LowRankMoves, ...] = ()
+    contacts: TouchingPairs | None = None
 
     @property
     def n_vertices(self) -> int:

@@ -2,12 +2,13 @@
 
 With ``u = w' - w`` the change of the weights, ``(n, K)`` over the window's n frames,
 
-    min_u  sum_k u_k^T Q u_k + sum_t u_t^T G u_t + (r - B u)^T M^-1 (r - B u),    u >= -w
+    min_u  sum_k u_k^T Q u_k + sum_t u_t^T (G + H_t) u_t + (r - B u)^T M^-1 (r - B u),    u >= -w
 
-``Q`` holds what changes in time cost, ``G`` what moving the fixed vertices costs, ``B`` how the few constrained frames
-answer. A primal-dual interior point method (Mehrotra's): each of its 15 to 20 steps is one banded factorisation, the
-few rows of ``B`` by Woodbury's formula. Active sets alone creep here, since a curve that bends slowly leaves zero one
-frame at a time; they only finish: weights that the interior point leaves next to zero become exactly zero.
+``Q`` holds what changes in time cost, ``G`` what moving the fixed vertices costs, the diagonal ``H_t`` what opening
+closed lids and lips costs, ``B`` how the few constrained frames answer. A primal-dual interior point method
+(Mehrotra's): each of its 15 to 20 steps is one banded factorisation, the few rows of ``B`` by Woodbury's formula.
+Active sets alone creep here, since a curve that bends slowly leaves zero one frame at a time; they only finish: weights
+that the interior point leaves next to zero become exactly zero.
 """
 
 from __future__ import annotations
@@ -54,25 +55,37 @@ def time_matrix(n: int, tied_before: bool, tied_after: bool, smoothness: float) 
 
 @dataclass(frozen=True)
 class WeightsProblem:
-    """What stays the same: ``time`` = Q (n, n), five bands, ``gram`` = G (K, K) or None, ``lower`` = -w (n, K)."""
+    """What stays the same: ``time`` = Q (n, n), five bands, ``gram`` = G (K, K) or None, ``lower`` = -w (n, K).
+
+    ``opening`` (n, K) is the diagonal of every H_t, or None.
+    """
 
     time: sp.csr_matrix
     gram: Array | None
     lower: Array
+    opening: Array | None = None
 
     @cached_property
     def bands(self) -> Array:
         """Lower bands of the matrix of `cost`, as `System` takes them."""
-        return chain_bands(self.time, self.lower.shape[1]) if self.gram is None else frame_bands(self.time, self.gram)
+        n_bases = self.lower.shape[1]
+        bands = chain_bands(self.time, n_bases) if self.gram is None else frame_bands(self.time, self.gram)
+        if self.opening is not None:
+            bands[0] += self.opening.reshape(bands[0].shape)
+        return bands
 
     def cost(self, change: Array) -> float:
         """What the change ``u`` (n, K) costs, constraints aside."""
         return float(np.sum(change * self.force(change)))
 
     def force(self, change: Array) -> Array:
-        """``Q u + u G``, (n, K)."""
+        """``Q u + u G + H u``, (n, K)."""
         force = np.asarray(self.time @ change)
-        return force if self.gram is None else force + change @ self.gram
+        if self.gram is not None:
+            force += change @ self.gram
+        if self.opening is not None:
+            force += self.opening * change
+        return force
 
     def solve(self, rows: FrameRows, goals: Array, metric: Array, start: Array) -> Array:
         """The best change (n, K) for goals ``r`` (R,) and metric ``M`` (R, R), beginning near ``start`` (n, K).
