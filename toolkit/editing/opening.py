@@ -47,7 +47,7 @@ class OpenedTake:
 
 
 def open_take(shot: Shot, progress: Progress = silent) -> OpenedTake:
-    """Load what the stages left and make the transfer's factor again."""
+    """Load what the stages left."""
     for stage in _NEEDED:
         if not shot.is_current(stage, current_key(shot, stage)):
             raise InputError(
@@ -63,7 +63,7 @@ def open_take(shot: Shot, progress: Progress = silent) -> OpenedTake:
     bases = np.array(shot.array("transfer", "bases"))
     rest = target.rest.smooth
     weights = np.array(shot.array("bases", "weights"), dtype=np.float64)
-    take = EditableTake(rest, bases - rest, weights, open_system(shot, target), contacts=_contacts(shot))
+    take = EditableTake(rest, bases - rest, weights, open_system(shot), contacts=_contacts(shot))
     progress("opening the shot", 3, 3)
     details = detail_take(shot, target)
     return OpenedTake(

@@ -27,7 +27,9 @@ DetailOffset = Callable[[int, NDArray[np.int64], ShapeAt], Array]
 class TransferSystem(Protocol):
     """The part of `toolkit.transfer.DeformationTransfer` that edits need: ``A`` and its factor."""
 
-    matrix: sp.csc_matrix
+    @property
+    def matrix(self) -> sp.csc_matrix:
+        """``A``, (V, V)."""
 
     @property
     def factor(self) -> Factor:

@@ -51,12 +51,12 @@ STAGES: dict[str, Stage] = {
             ("inputs",),
             ("stabilise", "smoothing"),
             decompose.work,
-            version=3,
+            version=4,
             by_frames=True,
             reads=("source_vertices.npy", "source_triangles.npy"),
         ),
         Stage("bases", ("inputs", "decompose"), ("bases",), bases.work, version=2, reads=("lines.json",)),
-        Stage("transfer", ("register", "bases"), ("smoothing", "transfer", "details"), transfer.work),
+        Stage("transfer", ("register", "bases"), ("smoothing", "transfer", "details"), transfer.work, version=2),
         Stage("result", ("transfer",), ("smoothing", "details"), result.work, version=2, by_frames=True),
     )
 }

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
+import scipy.sparse as sp
 
 from toolkit.contacts import ContactMap
 from toolkit.decomposition import Decomposer
@@ -11,12 +15,15 @@ from toolkit.feature_lines import line_edges
 from toolkit.large_scale import transfer_bases
 from toolkit.progress import Progress
 from toolkit.shot import Shot, StageFolder
+from toolkit.solve import Factor, factorise
 from toolkit.stages.bases import load_pairs
 from toolkit.stages.inputs import load_lines, load_mesh
 from toolkit.stages.register import load_target
 from toolkit.transfer import DeformationTransfer, triangle_weights
 
-__all__ = ["open_system", "target_decomposer", "work"]
+__all__ = ["SavedSystem", "open_system", "target_decomposer", "work"]
+
+_MATRIX = ("data", "indices", "indptr")
 
 
 def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
@@ -37,7 +44,8 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     folder.save("bases", bases)
     folder.save("rest", target.rest.smooth)
     folder.save("gain", gain)
-    folder.save("motion", motion)
+    for name in _MATRIX:
+        folder.save(f"matrix_{name}", getattr(system.matrix, name))
     folder.numbers |= {
         "bases": len(bases),
         "feature_line_edges": len(line_edges(load_lines(shot))) if shot.config.transfer.feature_lines else 0,
@@ -45,9 +53,23 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     }
 
 
-def open_system(shot: Shot, target: Decomposer) -> DeformationTransfer:
-    """The system that the finished stage solved, factorised again: what edits of poses need."""
-    return _system(shot, target, _shapes(shot), np.array(shot.array("transfer", "motion")))
+@dataclass(frozen=True, eq=False)
+class SavedSystem:
+    """The matrix that the finished stage solved with, and its factor once that is needed."""
+
+    matrix: sp.csc_matrix
+
+    @cached_property
+    def factor(self) -> Factor:
+        """Made anew: the solver's library has no way to keep one."""
+        return factorise(self.matrix)
+
+
+def open_system(shot: Shot) -> SavedSystem:
+    """The system that the finished stage solved: what edits of poses need."""
+    data, indices, starts = (np.array(shot.array("transfer", f"matrix_{name}")) for name in _MATRIX)
+    n = len(starts) - 1
+    return SavedSystem(sp.csc_matrix((data, indices, starts), shape=(n, n)))
 
 
 def target_decomposer(shot: Shot) -> Decomposer:
