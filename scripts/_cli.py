@@ -6,6 +6,7 @@ Exit codes: 0 done, 1 failed, 2 bad usage or bad input, 130 stopped by Ctrl-C.
 from __future__ import annotations
 
 import argparse
+import errno
 import json
 import logging
 import sys
@@ -25,7 +26,7 @@ from tqdm import tqdm  # noqa: E402  (after the path is set)
 from toolkit.errors import InputError  # noqa: E402
 from toolkit.progress import Progress  # noqa: E402
 
-__all__ = ["Bars", "Main", "parser_for", "print_stages", "run"]
+__all__ = ["Bars", "Main", "chosen", "parser_for", "print_stages", "run"]
 
 Main = Callable[[argparse.Namespace, Progress], dict[str, Any]]
 
@@ -38,6 +39,11 @@ def parser_for(description: str | None, *, shot: bool = True) -> argparse.Argume
     parser.add_argument("-v", "--verbose", action="store_true", help="say more, and show where an error came from")
     parser.add_argument("--json", action="store_true", help="end with one line of JSON on standard output")
     return parser
+
+
+def chosen(options: argparse.Namespace, *names: str) -> dict[str, Any]:
+    """Some of the options by name, for a function whose arguments are called the same."""
+    return {name: getattr(options, name) for name in names}
 
 
 class Bars:
@@ -110,8 +116,12 @@ _BAD_PLACES = (FileNotFoundError, NotADirectoryError, IsADirectoryError, Permiss
 def _of_the_system(error: OSError) -> InputError:
     """What the system says, as a sentence."""
     said = (error.strerror or str(error) or type(error).__name__).lower()
-    remedy = "check that the folder is there and that you may write to it"
-    return InputError(said, where=error.filename or "", remedy=remedy if isinstance(error, _BAD_PLACES) else "")
+    remedy = ""
+    if isinstance(error, _BAD_PLACES):
+        remedy = "check that the folder is there and that you may write to it"
+    elif error.errno in (errno.ENOSPC, errno.EDQUOT):
+        remedy = "make some room and run it again; what was finished is kept"
+    return InputError(said, where=error.filename or "", remedy=remedy)
 
 
 def print_stages(reports: list[Any]) -> None:

@@ -120,3 +120,21 @@ def test_hashes_follow_the_content(tmp_path: Path) -> None:
 def test_keys_do_not_depend_on_order() -> None:
     assert key_of({"a": 1, "b": {"c": 2.5, "d": None}}) == key_of({"b": {"d": None, "c": 2.5}, "a": 1})
     assert key_of({"a": 1}) != key_of({"a": 2})
+
+
+@pytest.mark.parametrize("name", ["weights.npy", "picks.json"])
+def test_a_stage_cut_short_is_not_current(shot: Shot, name: str) -> None:
+    with shot.write_stage("bases", "k1", {}) as folder:
+        folder.save("weights", np.ones(4))
+        (folder.path / "picks.json").write_text("[1, 2]", encoding="utf-8")
+    assert shot.is_current("bases", "k1")
+    os.truncate(shot.stage_folder("bases") / name, 3)
+    assert not shot.is_current("bases", "k1")
+
+
+@pytest.mark.parametrize("left", [3, 100, 140])
+def test_a_damaged_array_says_what_to_do(shot: Shot, left: int) -> None:
+    _write(shot, "k1", 1.0)
+    os.truncate(shot.stage_folder("bases") / "weights.npy", left)
+    with pytest.raises(InputError, match=r"weights\.npy: is damaged or cut short .*run_all\.py"):
+        shot.array("bases", "weights")

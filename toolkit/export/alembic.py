@@ -25,7 +25,7 @@ def write_alembic(performance: Performance, path: Path, progress: Progress) -> N
     polygons = polygons_of(performance.mesh)
     corners = np.ascontiguousarray(reverse_faces(polygons.counts, polygons.indices), dtype=np.int32)
     counts = np.ascontiguousarray(polygons.counts, dtype=np.int32)
-    with written_aside(path) as temporary:
+    with written_aside(path, room=performance.n_bytes) as temporary:
         archive = Abc.OArchive(str(temporary))
         sampling = archive.addTimeSampling(AbcCoreAbstract.TimeSampling(1.0 / performance.fps, 0.0))
         name = re.sub(r"[^\w-]+", "_", performance.name) or "performance"

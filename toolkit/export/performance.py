@@ -79,6 +79,11 @@ class Performance:
         return len(self.rest)
 
     @property
+    def n_bytes(self) -> int:
+        """Bytes of the exact frames, the neutral and the faces: about what a file of them takes."""
+        return 12 * (self.n_frames + 1) * self.n_vertices + 16 * len(self.triangles)
+
+    @property
     def mesh(self) -> TriangleMesh:
         """The target's neutral as a mesh."""
         vertices = np.asarray(self.rest, dtype=np.float64)

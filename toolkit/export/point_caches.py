@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolkit.export.performance import Performance
 from toolkit.meshio.aside import written_aside
+from toolkit.meshio.npy import write_blocks
 from toolkit.meshio.point_caches import MDD_HEADER, PC2_HEADER
 from toolkit.progress import Progress
 
@@ -38,13 +41,16 @@ def write_mdd(performance: Performance, path: Path, progress: Progress) -> None:
 def write_npy(performance: Performance, path: Path, progress: Progress) -> None:
     """Write an array ``(T, V, 3)`` float32."""
     shape = (performance.n_frames, performance.n_vertices, 3)
-    with written_aside(path) as temporary, temporary.open("wb") as file:
-        header = {"descr": "<f4", "fortran_order": False, "shape": shape}
-        np.lib.format.write_array_header_1_0(file, header)
-        _write_frames(performance, file, "<f4", "writing NumPy array", progress)
+    with written_aside(path) as temporary:
+        write_blocks(temporary, shape, "<f4", _frames(performance, "writing NumPy array", progress))
 
 
 def _write_frames(performance: Performance, file: BinaryIO, dtype: str, what: str, progress: Progress) -> None:
+    for block in _frames(performance, what, progress):
+        file.write(np.ascontiguousarray(block, dtype=dtype).data)
+
+
+def _frames(performance: Performance, what: str, progress: Progress) -> Iterator[NDArray[np.float32]]:
     for start, stop in performance.blocks():
-        file.write(np.ascontiguousarray(performance.read(start, stop), dtype=dtype).data)
+        yield performance.read(start, stop)
         progress(what, stop, performance.n_frames)

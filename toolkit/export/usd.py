@@ -25,7 +25,7 @@ def write_usd(performance: Performance, path: Path, progress: Progress) -> None:
     require("usd", path)
     from pxr import Usd
 
-    with written_aside(path) as temporary:
+    with written_aside(path, room=performance.n_bytes) as temporary:
         stage = Usd.Stage.CreateNew(str(temporary))
         _describe_stage(stage, performance)
         mesh = _define_mesh(stage, performance)

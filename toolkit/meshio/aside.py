@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 import shutil
@@ -13,13 +14,16 @@ __all__ = ["folder_aside", "written_aside"]
 
 
 @contextmanager
-def written_aside(path: str | Path) -> Iterator[Path]:
+def written_aside(path: str | Path, *, room: int = 0) -> Iterator[Path]:
     """Yield a temporary path beside ``path``; on success it replaces ``path``, on any failure it is removed.
 
     The temporary name keeps the suffix, since some libraries choose the format by it. The parent folder is made.
+    ``room`` bytes have to be free there, for libraries that do not survive a full disk; raises OSError if they aren't.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
+    if room > shutil.disk_usage(path.parent).free:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
     temporary = _temporary_name(path)
     try:
         yield temporary

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from toolkit.errors import InputError
 from toolkit.meshio.aside import written_aside
+from toolkit.meshio.npy import write_blocks
 from toolkit.progress import Progress, silent
 
 __all__ = ["FrameSequence", "cache_as_npy", "checked_fps", "frame_blocks"]
@@ -76,14 +77,15 @@ def cache_as_npy(sequence: FrameSequence, path: str | Path, progress: Progress =
     """
     shape = (sequence.n_frames, sequence.n_vertices, 3)
     with written_aside(path) as temporary:
-        target = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.float32, shape=shape)
-        for start, stop in sequence.blocks():
-            target[start:stop] = sequence.read(start, stop)
-            progress("reading frames", stop, sequence.n_frames)
-        target.flush()
-        del target  # the map is closed before the file is renamed
+        write_blocks(temporary, shape, np.float32, _read_through(sequence, progress))
     mapped = np.load(path, mmap_mode="r")
     return FrameSequence(*shape[:2], sequence.fps, str(path), lambda a, b: mapped[a:b], sequence.triangles)
+
+
+def _read_through(sequence: FrameSequence, progress: Progress) -> Iterator[NDArray[np.float32]]:
+    for start, stop in sequence.blocks():
+        yield sequence.read(start, stop)
+        progress("reading frames", stop, sequence.n_frames)
 
 
 def checked_fps(fps: float | None, where: object) -> float | None:

@@ -20,6 +20,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from toolkit.errors import InputError
 from toolkit.meshio.aside import folder_aside
+from toolkit.meshio.npy import write_array
 from toolkit.shot.config import ShotConfig, load_config
 from toolkit.shot.hashing import HashCache
 
@@ -37,7 +38,7 @@ class StageFolder:
 
     def save(self, name: str, array: NDArray[Any]) -> None:
         """Store an array as ``<name>.npy``."""
-        np.save(self.path / f"{name}.npy", array)
+        write_array(self.path / f"{name}.npy", array)
 
     def create(self, name: str, shape: tuple[int, ...], dtype: DTypeLike = np.float32) -> NDArray[Any]:
         """A new memory-mapped array ``<name>.npy`` to be filled block by block."""
@@ -112,11 +113,12 @@ class Shot:
         return manifest if isinstance(manifest, dict) else None
 
     def is_current(self, stage: str, key: str) -> bool:
-        """Whether the stage was finished from exactly these inputs, and its arrays are still there."""
+        """Whether the stage was finished from exactly these inputs, and its files are still there, each in full."""
         manifest = self.manifest(stage)
-        if manifest is None or manifest.get("key") != key:
+        if manifest is None or manifest.get("key") != key or "files" not in manifest:
             return False
-        return all((self.stage_folder(stage) / f"{name}.npy").exists() for name in manifest["arrays"])
+        folder = self.stage_folder(stage)
+        return all(_size(folder / name) == size for name, size in manifest["files"].items())
 
     def array(self, stage: str, name: str) -> NDArray[Any]:
         """A stage's array, memory-mapped and read-only."""
@@ -125,7 +127,11 @@ class Shot:
             raise InputError(
                 f"the stage {stage!r} has not been run", where=self.path, remedy=f"run scripts/run_all.py {self.path}"
             )
-        loaded: NDArray[Any] = np.load(path, mmap_mode="r")
+        try:
+            loaded: NDArray[Any] = np.load(path, mmap_mode="r")
+        except (ValueError, EOFError) as error:
+            remedy = f"run scripts/run_all.py {self.path}, which makes it anew"
+            raise InputError(f"is damaged or cut short ({error})", where=path, remedy=remedy) from error
         return loaded
 
     @contextmanager
@@ -139,7 +145,7 @@ class Shot:
                 "stage": stage,
                 "key": key,
                 "parameters": parameters,
-                "arrays": sorted(file.stem for file in folder.glob("*.npy")),
+                "files": {file.name: file.stat().st_size for file in sorted(folder.iterdir())},
                 "numbers": writing.numbers,
                 "seconds": round(time.perf_counter() - began, 3),
             }
@@ -151,3 +157,11 @@ class Shot:
         for folder in (self.path, self.path / "stages"):
             for left in folder.glob(".*.part*"):
                 shutil.rmtree(left, ignore_errors=True) if left.is_dir() else left.unlink(missing_ok=True)
+
+
+def _size(path: Path) -> int:
+    """Bytes of a file, -1 if there is none."""
+    try:
+        return path.stat().st_size
+    except OSError:
+        return -1

@@ -37,7 +37,7 @@ def load_performance(shot: Shot) -> Performance:
     frames = shot.array("result", "frames")
     motion = load_motion(shot).seen_from(load_pose(shot))
     chosen = np.array(shot.array("bases", "frames"))
-    edited = "weights" in (shot.manifest("result") or {})["arrays"]
+    edited = "weights.npy" in (shot.manifest("result") or {})["files"]
     shapes = shot.array("result", "morphs") if edited else frames[chosen]
     placed = shapes.astype(np.float64) - motion.translations[chosen][:, None]
     fps = (shot.manifest("inputs") or {}).get("numbers", {}).get("fps")
