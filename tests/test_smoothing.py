@@ -14,6 +14,7 @@ from toolkit.smoothing import (
     SmoothingParameters,
     apply_steps,
     filter_coefficients,
+    largest_eigenvalue,
     parameters_for_wavelength,
     smooth_with_pymeshlab,
 )
@@ -31,7 +32,7 @@ def test_the_polynomial_is_the_filter(bump: TriangleMesh, steps: int) -> None:
 def test_it_takes_a_third_of_the_passes() -> None:
     parameters = SmoothingParameters()
     triangles = np.array([[0, 1, 2]])
-    assert len(SmoothingFilter(triangles, 3, parameters).coefficients) < 40
+    assert len(SmoothingFilter(triangles, 3, parameters).coefficients) < 30
 
 
 def test_equals_pymeshlab_on_every_vertex(bump: TriangleMesh) -> None:
@@ -58,16 +59,29 @@ def test_passes_taken_together_are_the_same_passes(bump: TriangleMesh, columns: 
     rows = average[order][:, order].tocoo()
     bandwidth = int(np.abs(rows.row - rows.col).max())
     csr = rows.tocsr()
-    share = (1 / np.diff(csr.indptr)).astype(np.float32)
+    share, own = (1 / np.diff(csr.indptr)).astype(np.float32), np.float32(0.3)
     block = np.random.default_rng(2).normal(size=(bump.n_vertices, columns)).astype(np.float32)
     coefficients = (0.8 ** np.arange(20)).astype(np.float32)
-    graph = csr.indptr.astype(np.uint32), csr.indices.astype(np.uint32), share, coefficients
+    graph = csr.indptr.astype(np.uint32), csr.indices.astype(np.uint32), share, own, coefficients
     together, one_by_one, spare = np.empty_like(block), np.empty_like(block), np.empty_like(block)
     chebyshev_of_average(*graph, bump.n_vertices, 1, block, one_by_one, spare)
     assert bump.n_vertices > 4 * bandwidth
     for depth in (2, 7, 19, 40):
         chebyshev_of_average(*graph, bandwidth, depth, block, together, spare)
         assert np.array_equal(together, one_by_one)
+
+
+def test_the_eigenvalues_are_where_the_polynomial_is_fitted(bump: TriangleMesh) -> None:
+    """With a border, closed, with edges of three triangles, with borders that touch, and on the border only."""
+    tetrahedron = np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
+    fin, tie = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]]), np.array([[0, 1, 2], [0, 3, 4]])
+    surfaces, others = (bump.triangles, tetrahedron, tie[:1]), (fin, tie)
+    for triangles, bound in [(t, 1.5) for t in surfaces] + [(t, 2.0) for t in others]:
+        average = smoothing_average(triangles, int(triangles.max()) + 1).toarray()
+        eigenvalues = np.linalg.eigvals(np.eye(len(average)) - average)
+        assert largest_eigenvalue(triangles) == bound
+        assert eigenvalues.real.max() <= bound + 1e-9
+        assert np.abs(eigenvalues.imag).max() < 1e-6
 
 
 @pytest.mark.parametrize("wavelength", [0.6, 1.2, 2.4])

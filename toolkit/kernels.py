@@ -104,8 +104,8 @@ def place_frames(points, shift, position, rotations, translations, scale, out):
 
 
 @njit(**_OPTIONS)
-def _average_rows(starts, neighbours, share, first, last, current, coefficient, block, total, previous):
-    """Rows ``first <= i < last`` of ``previous <- coefficient block - share W current - previous``.
+def _average_rows(starts, neighbours, share, own, first, last, current, coefficient, block, total, previous):
+    """Rows ``first <= i < last`` of ``previous <- coefficient block + own current - share A current - previous``.
 
     Four neighbours at a time: ``total`` is then read and written a quarter as often.
     """
@@ -131,18 +131,17 @@ def _average_rows(starts, neighbours, share, first, last, current, coefficient, 
             p += 1
         s = share[i]
         for c in range(n_columns):
-            previous[i, c] = coefficient * block[i, c] - s * total[c] - previous[i, c]
+            previous[i, c] = coefficient * block[i, c] + own * current[i, c] - s * total[c] - previous[i, c]
 
 
 @njit(**_OPTIONS)
-def chebyshev_of_average(starts, neighbours, share, coefficients, bandwidth, depth, block, out, spare):
-    """``out <- sum_k c_k T_k(-W) block`` (V, C) by Clenshaw's recurrence, ``W`` the mean over each vertex's neighbours.
+def chebyshev_of_average(starts, neighbours, share, own, coefficients, bandwidth, depth, block, out, spare):
+    """``out <- sum_k c_k T_k(S) block`` (V, C) by Clenshaw's recurrence, ``S x = own x - share (sum over neighbours)``.
 
-    ``neighbours[starts[i]:starts[i + 1]]`` are row i's, none further than ``bandwidth`` rows away; ``share`` (V,) one
-    over their number. ``b_k = c_k block - 2 W b_(k+1) - b_(k+2)``; ``out`` and ``spare`` do for all of them, as a row
-    of ``b_(k+2)`` is last needed where ``b_k`` takes its place. ``depth`` steps go over the rows together, each a chunk
-    of ``bandwidth`` rows behind the step before it, so that a chunk is in the cache for all of them: memory is the
-    bottleneck.
+    ``neighbours[starts[i]:starts[i + 1]]`` are row i's, none further than ``bandwidth`` rows away; ``share`` (V,).
+    ``b_k = c_k block + 2 S b_(k+1) - b_(k+2)``; ``out`` and ``spare`` do for all of them, as a row of ``b_(k+2)`` is
+    last needed where ``b_k`` takes its place. ``depth`` steps go over the rows together, each a chunk of ``bandwidth``
+    rows behind the step before it, so that a chunk is in the cache for all of them: memory is the bottleneck.
     """
     n_rows = len(block)
     degree = len(coefficients) - 1
@@ -165,8 +164,8 @@ def chebyshev_of_average(starts, neighbours, share, coefficients, bandwidth, dep
                 k = degree - 1 - done - step
                 # Not swapped but chosen, since the steps of a front alternate.
                 read, write = (current, previous) if (done + step) % 2 == 0 else (previous, current)
-                weight = share if k == 0 else double
-                _average_rows(starts, neighbours, weight, first, last, read, coefficients[k], block, total, write)
+                weight, at = (share, own) if k == 0 else (double, own + own)
+                _average_rows(starts, neighbours, weight, at, first, last, read, coefficients[k], block, total, write)
         done += steps
 
 

@@ -20,7 +20,7 @@ from toolkit.blocks import scratch
 from toolkit.errors import InputError
 from toolkit.kernels import chebyshev_of_average
 from toolkit.mesh.core import TriangleMesh
-from toolkit.mesh.topology import unique_edges
+from toolkit.mesh.topology import boundary_edges, edge_counts, unique_edges
 from toolkit.operators import smoothing_average
 
 __all__ = [
@@ -111,14 +111,15 @@ class SmoothingFilter:
         # Unsigned, since a compiled loop asks of every signed index whether it counts from the end.
         self._starts, self._neighbours = renumbered.indptr.astype(np.uint32), renumbered.indices.astype(np.uint32)
         count = np.diff(renumbered.indptr)
-        # W is a mean: the entries of a row are all alike.
-        self._share = 1 / count
+        half = largest_eigenvalue(triangles) / 2
+        # S = (I - W) / half - I; W is a mean: the entries of a row are all alike.
+        self._own, self._share = 1 / half - 1, 1 / (half * count)
         rows = np.repeat(np.arange(n_vertices), count)
         self._bandwidth = max(1, int(np.abs(rows - renumbered.indices).max(initial=0)))
-        self.coefficients = filter_coefficients(parameters.steps, parameters.lambda_, parameters.mu)
-        # Terms below single precision's rounding are passes for nothing.
+        self.coefficients = filter_coefficients(parameters.steps, parameters.lambda_, parameters.mu, 2 * half)
+        # Terms below what so many passes in single precision round away are passes for nothing.
         tail = np.cumsum(np.abs(self.coefficients[::-1]))[::-1]
-        self._coefficients32 = self.coefficients[: max(1, int(np.count_nonzero(tail > 1.5e-7)))]
+        self._coefficients32 = self.coefficients[: max(1, int(np.count_nonzero(tail > 3e-7)))]
 
     def smooth(self, values: NDArray[np.floating]) -> NDArray[np.floating]:
         """``M values`` for an array ``(V, C)`` in the original numbering, in the precision that it has."""
@@ -138,6 +139,7 @@ class SmoothingFilter:
             self._starts,
             self._neighbours,
             self._share.astype(block.dtype),
+            block.dtype.type(self._own),
             coefficients.astype(block.dtype),
             self._bandwidth,
             _STEPS_TOGETHER,
@@ -148,16 +150,28 @@ class SmoothingFilter:
         return smooth.reshape(block.shape)
 
 
-def filter_coefficients(steps: int, lambda_: float, mu: float) -> NDArray[np.float64]:
-    """Chebyshev coefficients of ``((1 - lambda k)(1 - mu k))^steps`` in ``s = k - 1`` on [-1, 1].
+def largest_eigenvalue(triangles: NDArray[np.integer]) -> float:
+    """A bound on the eigenvalues of ``I - W``, ``W`` the `smoothing_average`: 3/2 on a surface, 2 on any mesh.
 
-    ``k`` in [0, 2] are the eigenvalues of ``I - W``, so ``s`` belongs to ``-W``. Cut where the rest is below 1e-11;
-    nodes are doubled until that is so, since thousands of steps are still a polynomial of a few hundred degrees.
+    The adjacency is half the sum of the triangles' own, each of which is at least ``-I`` on its corners. A vertex off
+    the border has as many triangles as neighbours, so ``A >= -D / 2`` there and ``W = D^-1 A >= -1/2``. Border vertices
+    see the border alone, each the mean of itself and two others: ``W >= -1/3``. Where edges have three triangles or
+    borders touch, this does not hold.
+    """
+    border = np.bincount(boundary_edges(triangles).ravel(), minlength=1)
+    return 1.5 if edge_counts(triangles).max(initial=0) <= 2 and border.max() <= 2 else 2.0
+
+
+def filter_coefficients(steps: int, lambda_: float, mu: float, largest: float = 2.0) -> NDArray[np.float64]:
+    """Chebyshev coefficients of ``((1 - lambda k)(1 - mu k))^steps`` in ``s = 2 k / largest - 1`` on [-1, 1].
+
+    ``k`` in [0, ``largest``] are the eigenvalues of ``I - W``. Cut where the rest is below 1e-11; nodes are
+    doubled until that is so, since thousands of steps are still a polynomial of a few hundred degrees.
     """
     n_nodes = 32
     while True:
         angles = np.pi * (np.arange(n_nodes) + 0.5) / n_nodes
-        k = np.cos(angles) + 1
+        k = (np.cos(angles) + 1) * largest / 2
         full = dct(((1 - lambda_ * k) * (1 - mu * k)) ** steps, type=2) / n_nodes
         full[0] /= 2
         tail = np.cumsum(np.abs(full[::-1]))[::-1]

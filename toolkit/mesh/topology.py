@@ -12,6 +12,7 @@ __all__ = [
     "boundary_vertices",
     "connected_components",
     "directed_edges",
+    "edge_counts",
     "unique_edges",
     "vertex_adjacency",
 ]
@@ -26,6 +27,11 @@ def directed_edges(triangles: NDArray[np.integer]) -> NDArray[np.int64]:
 def unique_edges(triangles: NDArray[np.integer]) -> NDArray[np.int64]:
     """Return each undirected edge once, ``(E, 2)`` with the lower id first, sorted."""
     return _edges_with_counts(triangles)[0]
+
+
+def edge_counts(triangles: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Number of triangles on each of `unique_edges`, ``(E,)``."""
+    return _edges_with_counts(triangles)[1]
 
 
 def boundary_edges(triangles: NDArray[np.integer]) -> NDArray[np.int64]:
