@@ -18,6 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from toolkit.blocks import scratch
 from toolkit.progress import Progress, silent
 
 __all__ = ["Fill", "MapBlocks", "StageBlocks"]
@@ -50,19 +51,20 @@ class StageBlocks:
     fill: Fill | None = None
 
     def __post_init__(self) -> None:
-        self._maps = [self._map(name, "r+") for name in self.arrays]
+        self._maps = [np.lib.format.open_memmap(self.folder / f"{name}.npy", mode="r") for name in self.arrays]
 
     def __call__(self, start: int, stop: int) -> None:
         """Do one block."""
-        if self.fill is not None:
-            self.fill(start, stop, *(array[start:stop] for array in self._maps))
-            return
-        with _ONE_AT_A_TIME:
-            fill = _opened(self.opener, self.shot, self.folder)
-        blocks = [np.empty((stop - start, *array.shape[1:]), array.dtype) for array in self._maps]
+        fill = self.fill
+        if fill is None:
+            with _ONE_AT_A_TIME:
+                fill = _opened(self.opener, self.shot, self.folder)
+        blocks = [
+            scratch(f"stage {name}", array[start:stop]) for name, array in zip(self.arrays, self._maps, strict=True)
+        ]
         fill(start, stop, *blocks)
         for array, block in zip(self._maps, blocks, strict=True):
-            _write(array, start, block)
+            _write(array, start, block, to_disk=self.fill is None)
 
     def __getstate__(self) -> dict[str, Any]:
         paths = {"shot": self.shot.resolve(), "folder": self.folder.resolve()}
@@ -70,22 +72,21 @@ class StageBlocks:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__ |= state
-        self._maps = [self._map(name, "r") for name in self.arrays]
-
-    def _map(self, name: str, mode: Any) -> np.memmap:
-        return np.lib.format.open_memmap(self.folder / f"{name}.npy", mode=mode)
+        self.__post_init__()
 
 
-def _write(array: np.memmap, start: int, block: NDArray[Any]) -> None:
-    """Write a block where ``array`` has frames from ``start`` on, down to the disk.
+def _write(array: np.memmap, start: int, block: NDArray[Any], *, to_disk: bool) -> None:
+    """Write a block where ``array`` has frames from ``start`` on; ``to_disk`` waits until it lies there.
 
-    Through the file, not the map: machines that map the same page of a file on a network overwrite each other's part.
+    Through the file, not the map: machines that map the same page of a file on a network overwrite each other's part,
+    and a page written for the first time through a map costs a fault.
     """
     with open(str(array.filename), "r+b") as file:
         file.seek(array.offset + start * array[:1].nbytes)
         file.write(block.data)
-        file.flush()
-        os.fsync(file.fileno())
+        if to_disk:
+            file.flush()
+            os.fsync(file.fileno())
 
 
 # Every task brings its own copy; what it opens is kept for the next ones. A stage's folder has a new name each time.
