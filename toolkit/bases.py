@@ -47,7 +47,7 @@ class BasisParameters:
     threshold_length: float | None = None
     count: int | None = None
     contact_share: float = 1.0
-    steadiness: float = 1.0
+    steadiness: float = 4.0
 
     def __post_init__(self) -> None:
         wrong = self.threshold < 0 or (self.threshold_length or 0) < 0 or (self.count is not None and self.count < 1)
