@@ -137,6 +137,14 @@ def test_a_target_turned_inside_out_is_refused(pair) -> None:
         register(pair.source.mesh, inside_out, pair.landmarks)
 
 
+def test_bad_landmarks_are_refused_before_any_work(pair) -> None:
+    n = pair.target.mesh.n_vertices
+    target = pair.landmarks.target.copy()
+    target[4] = n
+    with pytest.raises(InputError, match=f"'place 4' is target vertex {n}"):
+        register(pair.source.mesh, pair.target.mesh, Landmarks.of(pair.landmarks.source, target, pair.landmarks.names))
+
+
 def test_numbers_are_plain_and_complete(registered: Registration) -> None:
     numbers = asdict(registered.quality)
     assert all(value is None or isinstance(value, str | float) for value in numbers.values())

@@ -22,6 +22,9 @@ ADVISED_LANDMARKS = 30
 """Below this the registration's error grows quickly; 40 to 50 are better still."""
 
 
+_MIRROR = 0.5
+"""A mirrored fit that leaves less than this share of what the plain one does means that left and right are swapped."""
+
 CLOSED = '"closed": true'
 
 
@@ -183,7 +186,7 @@ def _mirrored(source: NDArray[np.float64], target: NDArray[np.float64], where: s
     if np.linalg.det(u @ vt) > 0:
         return []
     as_it_is, mirrored = 1 - (s[0] + s[1] - s[2]) ** 2, 1 - s.sum() ** 2
-    if mirrored > 0.25 * as_it_is:
+    if mirrored > _MIRROR * as_it_is:
         return []
     what = "the landmarks fit only a mirror image of the source: left and right seem swapped on one face"
     return [Finding("error", what, where, None, "use the character's own left and right on both faces")]

@@ -5,10 +5,11 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 
+from toolkit.checks import check_landmarks, raise_for
 from toolkit.feature_lines import FeatureLine
 from toolkit.mesh import TriangleMesh
 from toolkit.progress import Progress, silent
-from toolkit.registration.consistency import check_landmarks
+from toolkit.registration.consistency import refuse_contradictions
 from toolkit.registration.fit import fit
 from toolkit.registration.judge import Registration, judge
 from toolkit.registration.landmarks import Landmarks
@@ -43,12 +44,14 @@ def register(
 
     Raises
     ------
-    InputError : landmarks out of range, used twice or too few
-    RegistrationError : landmarks contradict each other or are mirrored; too many triangles turned over; nothing of
-        the target found near
+    InputError : landmarks out of range, used twice, too few, all in one plane or mirrored
+    RegistrationError : landmarks contradict each other; too many triangles turned over; nothing of the target near
     """
     given = parameters or RegistrationParameters()
-    warnings = check_landmarks(landmarks, source.vertices, target.vertices)
+    findings = check_landmarks(landmarks.names, landmarks.source, landmarks.target, source, target, "landmarks")
+    raise_for(findings)
+    warnings = [finding.what for finding in findings]
+    warnings += refuse_contradictions(landmarks, source.vertices, target.vertices)
     progress("preparing the registration", 0, 1)
     job = prepare(source, target, landmarks, curves)
     progress("preparing the registration", 1, 1)
