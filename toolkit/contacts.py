@@ -100,18 +100,35 @@ def _nearest_across(frames: NDArray[np.floating], side: Ids, other: Ids, corners
     points = (frames[:, side] - middle).astype(np.float64)
     starts, ends = ((frames[:, ids] - middle).astype(np.float64) for ids in (other[:-1], other[1:]))
     direction = ends - starts
-    squared = np.maximum(np.sum(direction**2, axis=2), 1e-30)[:, None]
+    squared = np.maximum(_dots(direction, direction), 1e-30).transpose(0, 2, 1)
     # |p - s - a d|^2 from products of matrices, (T, n, m): nothing with a fourth axis is made.
-    along = points @ direction.transpose(0, 2, 1) - np.sum(starts * direction, axis=2)[:, None]
-    share = np.clip(along / squared, 0, 1)
-    distance = np.sum(points**2, axis=2)[:, :, None] + np.sum(starts**2, axis=2)[:, None]
-    distance -= 2 * (points @ starts.transpose(0, 2, 1))
-    distance -= share * (2 * along - share * squared)
-    nearest = np.argmin(distance.transpose(1, 0, 2).reshape(len(side), -1), axis=1)
-    frame, segment = np.divmod(nearest, distance.shape[2])
+    one = np.ones_like(points[:, :, :1])
+    along = _products([points, one], [direction, -_dots(starts, direction)])
+    distance = _products(
+        [points, _dots(points, points), one], [-2 * starts, np.ones_like(starts[:, :, :1]), _dots(starts, starts)]
+    )
+    share = along / squared
+    np.clip(share, 0, 1, out=share)
+    along *= 2
+    along -= share * squared
+    along *= share
+    distance -= along
+    segments = np.argmin(distance, axis=2)
+    at = np.arange(len(side))
+    frame = np.argmin(np.take_along_axis(distance, segments[:, :, None], axis=2)[:, :, 0], axis=0)
+    segment = segments[frame, at]
     edge = np.stack([other[segment], other[segment + 1]], axis=1)
-    chosen = share[frame, np.arange(len(side)), segment]
-    return side, edge, chosen, np.tile(corners, (len(side), 1))
+    return side, edge, share[frame, at, segment], np.tile(corners, (len(side), 1))
+
+
+def _dots(a: Array, b: Array) -> Array:
+    """Dot products (T, n, 1) of vectors (T, n, 3)."""
+    return np.sum(a * b, axis=2, keepdims=True)
+
+
+def _products(left: list[Array], right: list[Array]) -> Array:
+    """``L R^T`` (T, n, m) of the columns of both, each joined."""
+    return np.asarray(np.concatenate(left, axis=2) @ np.concatenate(right, axis=2).transpose(0, 2, 1))
 
 
 def _with_closing(pairs: ContactPairs, frames: NDArray[np.floating]) -> ContactPairs:

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 _SAMPLE = 2000
 _ROUNDS = 12
 _STABLE_SHARE = 0.2
+_ROUNDING = 1e-7
+"""Share of the face's size below which a residual is rounding: that of the take's single precision, mostly."""
 
 
 @dataclass(frozen=True)
@@ -73,18 +75,26 @@ def stable_weights(rest: Array, points: Array) -> Array:
     """
     n, n_frames = len(rest), len(points)
     weights = np.ones(n)
-    smallest = 1e-9 * float(np.linalg.norm(np.ptp(rest, axis=0)))
-    # Vertex by vertex, so that all frames are one product of matrices.
-    rows = np.ascontiguousarray(points.transpose(1, 0, 2)).reshape(n, -1)
+    smallest = _ROUNDING * float(np.linalg.norm(np.ptp(rest, axis=0)))
+    # About the middle, where rounding is least; vertex by vertex, so that all frames are one product of matrices.
+    middle = rest.mean(axis=0)
+    rest = rest - middle
+    rows = (points - middle).transpose(1, 0, 2).reshape(n, -1)
+    squares = np.einsum("ni,ni->n", rows, rows)
     for _ in range(_ROUNDS):
-        motion = _rigid_fits(rest, rows, weights)
-        residual = rest @ motion.rotations.reshape(-1, 3).T
-        residual += motion.translations.ravel()
-        residual -= rows
-        length = np.sqrt(np.einsum("ni,ni->n", residual, residual) / n_frames)
+        length = np.sqrt(_squared_residuals(rest, rows, squares, _rigid_fits(rest, rows, weights)) / n_frames)
         sigma = max(float(np.quantile(length, _STABLE_SHARE)), smallest)
         weights = 1 / (1 + (length / sigma) ** 2) ** 2
     return weights
+
+
+def _squared_residuals(rest: Array, rows: Array, squares: Array, motion: HeadMotion) -> Array:
+    """``sum_t |R_t r_v + t_t - p_tv|^2`` (n,), multiplied out; ``squares`` (n,) are ``sum_t |p_tv|^2``."""
+    turn, shift = motion.rotations.reshape(-1, 3), motion.translations.ravel()
+    onto = rows @ np.column_stack([turn, shift])  # sum_t R_t^T p_tv and t_t . p_tv
+    total = squares + len(motion.rotations) * np.einsum("ni,ni->n", rest, rest) + shift @ shift
+    total += 2 * (rest @ (shift @ turn) - np.einsum("ni,ni->n", rest, onto[:, :3]) - onto[:, 3])
+    return np.maximum(total, 0)
 
 
 def rigid_fits(rest: Array, points: Array, weights: Array) -> HeadMotion:
@@ -96,9 +106,9 @@ def _rigid_fits(rest: Array, rows: Array, weights: Array) -> HeadMotion:
     """As `rigid_fits`, from points ``(n, 3T)``."""
     share = weights / weights.sum()
     rest_mean = share @ rest
-    means = (share @ rows).reshape(-1, 3)
     # The weighted rest points sum to zero, so the frames need no centring.
-    covariance = (((rest - rest_mean) * share[:, None]).T @ rows).reshape(3, -1, 3).transpose(1, 2, 0)
+    sums = (np.column_stack([rest - rest_mean, np.ones(len(rest))]) * share[:, None]).T @ rows
+    covariance, means = sums[:3].reshape(3, -1, 3).transpose(1, 2, 0), sums[3].reshape(-1, 3)
     u, _, vt = np.linalg.svd(covariance)
     sign = np.linalg.det(u @ vt)
     u[:, :, 2] *= sign[:, None]

@@ -16,7 +16,7 @@ from toolkit.stages.inputs import load_lines, load_mesh, load_sequence
 
 __all__ = ["load_pairs", "work"]
 
-# Frames in which pairs are looked for: enough to meet every blink of a long take.
+# Most frames in which pairs are looked for.
 _PAIRING_FRAMES = 240
 
 
@@ -72,7 +72,7 @@ def _contacts(
         progress("reading the rims of lids and lips", stop, sequence.n_frames)
     points = np.einsum("tji,tnj->tni", motion.rotations, points - motion.translations[:, None])
     compact = [Opening(o.name, np.searchsorted(ids, o.upper), np.searchsorted(ids, o.lower)) for o in openings]
-    step = max(1, sequence.n_frames // _PAIRING_FRAMES)
+    step = -(-sequence.n_frames // _PAIRING_FRAMES)
     pairs = find_contacts(compact, rest[ids], points[::step])
     gaps = pairs.gaps(np.concatenate([rest[ids][None], points]))
     return ContactPairs(ids[pairs.vertex], ids[pairs.edge], pairs.share, pairs.closes, ids[pairs.corners]), gaps
