@@ -4,6 +4,8 @@
     6_edit.py DIR add --frame 120 --point 4711=0,0.3,0 --window 90:150     a pose: the edit spreads over the window
     6_edit.py DIR add --frame 120 --distance 12,40=x1.2 --mode bases       every frame of a similar expression follows
     6_edit.py DIR wrinkle --frame 120 --curve 812,840,901 --scale 2        a wrinkle: deeper while it lasts
+    6_edit.py DIR wrinkle --frame 120 --brush 812=3% --mirror               copied to the other side of the face
+    6_edit.py DIR region brow --curve 812,840,901 --grow 1%                 a region to be used again: --region brow
     6_edit.py DIR list | undo | redo | off N | on N | remove N
     6_edit.py DIR preview 100 120                                          pictures: before, after, difference
     6_edit.py DIR apply                                                    writes result/frames.npy
@@ -20,8 +22,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from _cli import parser_for, run
-from _edit_options import add_pose_options, add_wrinkle_options, edit_of_file, pose_of, wrinkle_of
+from _edit_options import add_pose_options, edit_of_file, pose_of
 from _views import add_axes
+from _wrinkle_options import add_region_options, add_wrinkle_options, region_of, wrinkle_of
 
 from toolkit.progress import Progress
 
@@ -58,12 +61,35 @@ def add(shot: Shot, options: argparse.Namespace, progress: Progress) -> dict[str
 
 
 def wrinkle(shot: Shot, options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
-    """Solve an edit of a wrinkle and add it."""
+    """Solve an edit of a wrinkle and add it, or put it in an old one's place."""
     from toolkit.detail_edit import to_data
     from toolkit.editing import EditSession
 
     session = EditSession.open(shot, progress)
-    return _take_up(session, [("detail", to_data(wrinkle_of(options, session)))], None, options, progress)
+    asked = to_data(wrinkle_of(options, session))
+    return _take_up(session, [("detail", asked)], options.change, options, progress)
+
+
+def region(shot: Shot, options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
+    """Keep a region by name, or say which there are."""
+    from toolkit.editing import EditSession
+    from toolkit.editing.regions import load_regions, save_regions
+    from toolkit.errors import InputError
+
+    regions = load_regions(shot)
+    if options.name is not None:
+        selected = region_of(options, EditSession.open(shot, progress))
+        if selected is None or len(selected) == 0:
+            raise InputError(
+                "the region is empty", remedy="give --curve, --brush, --vertices or --region, and a larger distance"
+            )
+        regions[options.name] = selected
+        save_regions(shot, regions)
+    for name, one in regions.items():
+        print(f"{name}: {len(one):,} vertices")
+    if not regions:
+        print("no regions")
+    return {"regions": {name: len(one) for name, one in regions.items()}}
 
 
 def _take_up(
@@ -90,6 +116,7 @@ def _take_up(
 
 def _told(edit: Edit, session: EditSession) -> dict[str, Any]:
     """Say what an edit came to; contradictions show as residuals."""
+    from toolkit.detail_edit import DetailChange
     from toolkit.editing.moved import n_moved
     from toolkit.editing.words import describe
 
@@ -98,9 +125,14 @@ def _told(edit: Edit, session: EditSession) -> dict[str, Any]:
     residuals = [{"asked": one.asked, "left": one.left} for one in session.residuals(edit.number)]
     for constraint, residual in zip(edit.data.get("constraints", []), residuals, strict=False):
         print(f"  {constraint['kind']:<9} asked {residual['asked']:.4g}, left {residual['left']:.4g}")
+    data: dict[str, Any] = {"number": edit.number, "kind": edit.kind, "residuals": residuals}
+    solved = session.solved(edit.number)
+    if isinstance(solved, DetailChange) and len(solved.activation):
+        data |= {"window": list(solved.window), "vertices": len(solved.vertices)}
+        print("  frames {} to {}".format(*solved.window) + f", {len(solved.vertices):,} vertices with the band")
     count, most = n_moved(moved), float(moved.max())
     print(f"  all edits together move {count} of {len(moved)} frames, by {most:.4g} at most (the target's unit)")
-    return {"number": edit.number, "kind": edit.kind, "residuals": residuals, "moved_frames": count, "moved_most": most}
+    return data | {"moved_frames": count, "moved_most": most}
 
 
 def list_edits(shot: Shot, options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
@@ -181,6 +213,7 @@ _COMMANDS = {
     "add": add,
     "change": add,
     "wrinkle": wrinkle,
+    "region": region,
     "list": list_edits,
     "undo": undo_or_redo,
     "redo": undo_or_redo,
@@ -212,7 +245,11 @@ def parser() -> argparse.ArgumentParser:
         _add_outcome(one)
     one = command("wrinkle", "edit a wrinkle")
     add_wrinkle_options(one)
+    one.add_argument("--change", type=int, metavar="N", help="in the place of edit N")
     _add_outcome(one)
+    one = command("region", "keep a region by name, or list them")
+    one.add_argument("name", nargs="?", metavar="NAME", help="its name (all are listed)")
+    add_region_options(one)
     command("list", "all edits")
     command("undo", "take back the last step")
     command("redo", "do it again")

@@ -1,6 +1,6 @@
 """What all scripts share: options, progress, logging, exit codes, one JSON line at the end.
 
-Exit codes: 0 done, 1 failed, 2 bad usage or bad input, 130 stopped by Ctrl-C.
+Exit codes: 0 done, 1 failed, 2 bad usage or bad input, 130 stopped by Ctrl-C or SIGTERM.
 """
 
 from __future__ import annotations
@@ -9,7 +9,9 @@ import argparse
 import errno
 import json
 import logging
+import signal
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable
@@ -88,6 +90,9 @@ def run(parser: argparse.ArgumentParser, main: Main, arguments: list[str] | None
     level = logging.INFO if options.verbose else logging.WARNING
     logging.basicConfig(level=level, format="%(levelname)s %(message)s", stream=sys.stderr)
     bars = Bars()
+    if threading.current_thread() is threading.main_thread():
+        # Ended from outside, temporary folders are removed as after Ctrl-C.
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         result = main(options, bars)
         bars.close()

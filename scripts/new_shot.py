@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from _cli import parser_for, run
+from _cli import chosen, parser_for, run
 from _views import positive_number
 
 from toolkit.progress import Progress
@@ -22,18 +22,8 @@ def main(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     from toolkit.shot.new import create_shot
 
     folder: Path = options.shot
-    create_shot(
-        folder,
-        options.source_reference,
-        options.frames,
-        options.target,
-        landmarks=options.landmarks,
-        feature_lines=options.feature_lines,
-        source_extras=options.source_extras,
-        target_extras=options.target_extras,
-        fps=options.fps,
-        force=options.force,
-    )
+    named = ("landmarks", "feature_lines", "source_extras", "target_extras", "fps", "force")
+    create_shot(folder, options.source_reference, options.frames, options.target, **chosen(options, *named))
     print(f"made {folder}; next: python scripts/run_all.py {folder}")
     return {"shot": str(folder)}
 

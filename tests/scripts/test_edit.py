@@ -124,6 +124,77 @@ def test_wrinkles(shot: Path, edit: Edit) -> None:
     assert "no region 'chin'" in edit(shot, "wrinkle", "--frame", 20, "--region", "chin", "--remove", code=2)["error"]
 
 
+def test_regions_are_selected_kept_and_used_again(shot: Path, tmp_path: Path, edit: Edit) -> None:
+    line = f"{MIDDLE - 5},{MIDDLE + 5}"
+
+    def kept(name: str, *arguments: object) -> dict[int, float]:
+        edit(shot, "region", name, *arguments)
+        one = json.loads((shot / "regions.json").read_text())["regions"][name]
+        return dict(zip(one["vertices"], one.get("weights", [1.0] * len(one["vertices"])), strict=True))
+
+    along = kept("along", "--curve", line, "--within", "3%")
+    soft = kept("soft", "--curve", line, "--within", "3%", "--soft", "6%")
+    dab = kept("dab", "--brush", f"{MIDDLE}=10%", "--hardness", 0.3)
+    assert {vertex for vertex, weight in soft.items() if weight == 1} == set(along)
+    assert set(soft) > set(along)
+    assert dab[MIDDLE] == 1
+    assert 0 < min(dab.values()) < 0.3
+    holed = kept("holed", "--region", "dab", "--erase", f"{MIDDLE}=3%")
+    assert MIDDLE not in holed
+    assert set(holed) < set(dab)
+    larger = kept("grow", "--region", "along", "--grow", "8%")
+    assert set(larger) > set(along)
+    assert set(kept("shrink", "--region", "grow", "--shrink", "5%")) < set(larger)
+    other = kept("other", "--brush", f"{MIDDLE + 5}=10%", "--other-side")
+    assert MIDDLE + 5 not in other
+    assert MIDDLE - 5 in other
+    assert set(edit(shot, "region")["regions"]) == {"along", "soft", "dab", "holed", "grow", "shrink", "other"}
+    both = kept("both", "--region", "along", "--vertices", "3,4", "--brush", f"{MIDDLE}=10%")
+    assert set(both) == {*along, *dab, 3, 4}
+    shutil.copy(shot / "regions.json", tmp_path / "mine.json")
+    asked = ["--frame", 7, "--region", f"{tmp_path / 'mine.json'}:dab", "--remove", "--band", 0]
+    assert edit(shot, "wrinkle", *asked)["edits"][0]["vertices"] == len(dab)
+    assert "the region is empty" in edit(shot, "region", "none", code=2)["error"]
+
+
+def test_all_that_can_be_done_to_a_wrinkle(shot: Path, tmp_path: Path, edit: Edit) -> None:
+    shutil.copytree(shot, tmp_path / "another")
+    region = ["--frame", 7, "--brush", f"{MIDDLE + 4}=12%"]
+
+    def data(*arguments: object) -> tuple[dict[str, Any], dict[str, Any]]:
+        """An edit as the journal holds it, and what was said of it."""
+        said = edit(shot, "wrinkle", *arguments)["edits"][0]
+        held = json.loads((shot / "edits.jsonl").read_text().splitlines()[-1])["data"]
+        return held, said
+
+    first, said = data(*region, "--scale", -0.5, "--threshold", 0.6)
+    assert (first["factor"], first["threshold"]) == (-0.5, 0.6)
+    number, (start, end) = said["number"], said["window"]
+    changed, wider = data(*region, "--scale", 1.5, "--change", number)
+    assert (changed["factor"], wider["number"]) == (1.5, number)
+    assert wider["window"][0] < start <= 7 <= end < wider["window"][1]
+    paper, said = data(*region, "--remove", "--propagation", "gradients", "--window", "5:9", "--band", 1)
+    assert (paper["propagation"], said["window"]) == ("gradients", [5, 9])
+    copied, _ = data(*region, "--mirror", "--turn", 20, "--times", 1.2, "--strength", 0.5, "--from", MIDDLE + 4)
+    assert (copied["mirror"], copied["rotation"], copied["scale"], copied["strength"]) == (True, 20, 1.2, 0.5)
+    assert "goal" not in copied
+    there, _ = data(*region, "--mirror", "--paste-to", MIDDLE - 62, "--over")
+    assert (there["mirror"], there["add"]) == (True, True)
+    assert "goal" in there
+    earlier, _ = data(*region, "--frame", 9, "--source-frame", 7, "--hold")
+    assert (earlier["frame"], earlier["source_frame"], earlier["hold"]) == (9, 7, True)
+    other, _ = data(*region, "--paste-to", MIDDLE - 62, "--source-shot", tmp_path / "another")
+    assert other["source_shot"] == str(tmp_path / "another")
+    own, said = data(*region, "--static", "--remove")
+    assert own["details"] == "static"
+    assert said["moved_frames"] == 40
+    gains, _ = data("--brush", f"{MIDDLE}=12%", "--gain", "0=1,7=0.2,12=1")
+    assert gains["gains"] == [[0, 1.0], [7, 0.2], [12, 1.0]]
+    assert len(gains["region"]["vertices"]) > 10
+    assert len(edit(shot, "list")["edits"]) == 8
+    assert "nothing is asked for" in edit(shot, "wrinkle", *region, code=2)["error"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

@@ -25,7 +25,7 @@ from toolkit.detail_edit.data import (
 )
 from toolkit.detail_edit.edits import DetailEdit, GainEdit, KeyedEdit, PasteEdit, ReshapeEdit, ScaleEdit
 from toolkit.detail_edit.mirror import Mirror
-from toolkit.detail_edit.region import Dab, Region, banded, grown, painted, shrunk, within
+from toolkit.detail_edit.region import Dab, Region, banded, grown, middle_of, painted, shrunk, within
 from toolkit.detail_edit.solve import solve_detail_edit
 from toolkit.detail_edit.surface import Curve, Surface, SurfacePoint
 from toolkit.detail_edit.take import DetailTake
@@ -53,6 +53,7 @@ __all__ = [
     "find_window",
     "from_data",
     "grown",
+    "middle_of",
     "painted",
     "regions_from_data",
     "regions_to_data",

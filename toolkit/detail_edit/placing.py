@@ -9,7 +9,6 @@ from toolkit.detail_edit.bend import bent_along
 from toolkit.detail_edit.carry import Carrier, carrier
 from toolkit.detail_edit.edits import PasteEdit, ReshapeEdit
 from toolkit.detail_edit.flatten import FlatPatch, flattened, minimal_turn
-from toolkit.detail_edit.mirror import Mirror
 from toolkit.detail_edit.region import Region
 from toolkit.detail_edit.surface import Surface, SurfacePoint
 from toolkit.detail_edit.take import DetailTake
@@ -74,7 +73,7 @@ def _goal(edit: PasteEdit, take: DetailTake, source: DetailTake, start: Array) -
     """Where the start goes, and the axes ``(3, 3)`` there that the source's are carried to."""
     goal = edit.goal if edit.goal is not None else edit.start
     if edit.mirror:
-        mirror: Mirror = take.shared.get("mirror", lambda: Mirror(take.surface))
+        mirror = take.mirror
         if edit.goal is None:
             goal = mirror.across(edit.start)
         # The plane's axes are mirrored with the skin; the imaginary one turns round with the patch (`paste_carrier`).

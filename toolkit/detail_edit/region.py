@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from toolkit.detail_edit.surface import Curve, Surface, SurfacePoint
 from toolkit.errors import InputError
 
-__all__ = ["Dab", "Region", "banded", "grown", "painted", "shrunk", "within"]
+__all__ = ["Dab", "Region", "banded", "grown", "middle_of", "painted", "shrunk", "within"]
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
@@ -151,6 +151,16 @@ def banded(surface: Surface, region: Region, width: float) -> Region:
     distance = surface.distance_from_vertices(region.vertices, width, starts)
     field = np.where(np.isfinite(distance), 1 - distance / width, 0.0)
     return Region.of(np.maximum(field, region.field(surface.n_vertices)))
+
+
+def middle_of(surface: Surface, region: Region) -> SurfacePoint:
+    """The region's vertex nearest to its middle."""
+    surface.check_vertices(region.vertices)
+    places = surface.vertices[region.vertices]
+    away = np.linalg.norm(places - np.average(places, axis=0, weights=region.weights), axis=1)
+    # Only where it holds in full, or a thin bow's middle would lie beside it.
+    away[region.weights < 0.5 * region.weights.max()] = np.inf
+    return surface.at_vertex(int(region.vertices[np.argmin(away)]))
 
 
 def _by_level(surface: Surface, region: Region, change: Callable[[Ids], Ids]) -> Region:

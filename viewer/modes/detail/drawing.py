@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolkit.detail_edit import Curve, Mirror, Region, Surface, SurfacePoint, drawn, grown, shrunk, within
+from toolkit.detail_edit import Curve, Region, Surface, SurfacePoint, drawn, grown, shrunk, within
 from viewer.modes.shared.ground import Ground
 
-__all__ = ["centre", "line_through", "mirrored", "region_along", "resized", "thinned"]
-
-Array = NDArray[np.float64]
+__all__ = ["line_through", "mirrored", "region_along", "resized", "thinned"]
 
 
 def thinned(surface: Surface, points: Sequence[SurfacePoint], spacing: float) -> tuple[SurfacePoint, ...]:
@@ -47,14 +44,4 @@ def resized(ground: Ground, region: Region, distance: float) -> Region:
 
 def mirrored(ground: Ground, region: Region) -> Region:
     """The region on the other side of the face."""
-    mirror: Mirror = ground.take.shared.get("mirror", lambda: Mirror(ground.surface))
-    return mirror.region(region)
-
-
-def centre(ground: Ground, region: Region) -> SurfacePoint:
-    """The region's vertex nearest to its middle."""
-    places = ground.surface.vertices[region.vertices]
-    middle = np.average(places, axis=0, weights=region.weights)
-    # Only where it holds in full, or a thin bow's middle would lie beside it.
-    away = np.linalg.norm(places - middle, axis=1) + np.where(region.weights > 0.5 * region.weights.max(), 0, np.inf)
-    return ground.surface.at_vertex(int(region.vertices[np.argmin(away)]))
+    return ground.take.mirror.region(region)

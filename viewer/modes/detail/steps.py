@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from toolkit.detail_edit import Curve, Region, SurfacePoint
+from toolkit.detail_edit import Curve, Region, SurfacePoint, middle_of
 from toolkit.editing.regions import load_regions, save_regions
 from toolkit.errors import InputError
 from viewer.modes.detail import drawing
@@ -80,7 +80,7 @@ class DetailSteps(OpenEdit[DetailDraft]):
             return draft
         if draft.start is not None and not anew:
             return draft
-        return replace(draft, start=drawing.centre(ground, region))
+        return replace(draft, start=middle_of(ground.surface, region))
 
     def resize(self, steps: int) -> None:
         """Grow or shrink the region by a step."""
