@@ -35,7 +35,7 @@ class Handles:
         if self.radius <= 0:
             return np.array([vertex]), np.ones(1)
         if vertex not in self._known:
-            distance = dijkstra(self._graph, directed=False, indices=vertex, limit=self.radius)
+            distance = dijkstra(self._graph, indices=vertex, limit=self.radius)
             ids = np.flatnonzero(distance < self.radius)
             strength = (1 - (distance[ids] / self.radius) ** 2) ** 2
             self._known[vertex] = (ids, strength / strength.sum())

@@ -17,10 +17,14 @@ Ids = NDArray[np.int64]
 
 
 def edge_lengths(vertices: Array, edges: NDArray[np.integer]) -> sp.csr_matrix:
-    """The mesh as a graph: lengths of its edges (E, 2), each given once, ``(V, V)``."""
+    """The mesh as a graph: lengths of its edges (E, 2), each given once here and twice in the result, ``(V, V)``.
+
+    Both ways, since SciPy transposes a graph anew for every path along edges that are given one way.
+    """
     apart = vertices[edges[:, 0]] - vertices[edges[:, 1]]
     length = np.maximum(np.sqrt(np.sum(apart**2, axis=1)), 1e-30)
-    return sp.csr_matrix((length, (edges[:, 0], edges[:, 1])), shape=(len(vertices), len(vertices)))
+    ends = np.concatenate([edges, edges[:, ::-1]])
+    return sp.csr_matrix((np.tile(length, 2), (ends[:, 0], ends[:, 1])), shape=(len(vertices), len(vertices)))
 
 
 def vertices_beyond(vertices: Array, graph: sp.csr_matrix, start: NDArray[np.integer], distance: float) -> Ids:
@@ -32,7 +36,7 @@ def vertices_beyond(vertices: Array, graph: sp.csr_matrix, start: NDArray[np.int
     start = np.unique(np.asarray(start, dtype=np.int64))
     if not len(start):
         raise InputError("nothing says from where the distance counts", remedy="give vertices, or points to move")
-    along = dijkstra(graph, directed=False, indices=start, min_only=True)
+    along = dijkstra(graph, indices=start, min_only=True)
     apart = np.flatnonzero(np.isinf(along))
     if len(apart):
         along[apart] = cKDTree(vertices[start]).query(vertices[apart])[0]
