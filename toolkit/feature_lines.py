@@ -23,6 +23,7 @@ from toolkit.mesh.topology import unique_edges
 from toolkit.meshio.aside import written_aside
 
 __all__ = [
+    "EdgePaths",
     "FeatureLine",
     "Opening",
     "find_openings",
@@ -74,6 +75,64 @@ class Opening:
         return float(np.linalg.norm(vertices[self.upper[0]] - vertices[self.upper[-1]]))
 
 
+class EdgePaths:
+    """The edges of a mesh as a graph, to find paths in it: made once, it answers in milliseconds.
+
+    Parameters
+    ----------
+    vertices : (V, 3)
+    triangles : (F, 3)
+
+    ``edges`` (E, 2) are all of them, the lower id first.
+    """
+
+    def __init__(self, vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> None:
+        self.edges = unique_edges(triangles)
+        self._vertices = vertices
+        n = len(vertices)
+        self._keys = self.edges[:, 0] * n + self.edges[:, 1]
+        lengths = np.linalg.norm(vertices[self.edges[:, 0]] - vertices[self.edges[:, 1]], axis=1)
+        both = np.concatenate([self.edges, self.edges[:, ::-1]])
+        # Both ways: of an undirected graph the search would make a transposed copy each time.
+        self._graph = sp.csr_matrix((np.tile(np.maximum(lengths, 1e-300), 2), both.T), shape=(n, n))
+
+    def through(self, picks: Sequence[int] | Ids, closed: bool) -> Ids:
+        """As `shortest_edge_path`."""
+        stops = [int(p) for p in picks]
+        if len(stops) < (3 if closed else 2):
+            raise InputError(
+                f"{len(stops)} picked vertices make no {'closed' if closed else 'open'} line",
+                remedy=f"pick at least {3 if closed else 2}",
+            )
+        path = [stops[0]]
+        for start, end in zip(stops, stops[1:] + stops[:1] if closed else stops[1:], strict=False):
+            path += self._between(start, end)
+        return np.array(path[:-1] if closed else path, dtype=np.int64)
+
+    def joins(self, ids: Ids, closed: bool) -> bool:
+        """Whether consecutive vertices ``(n,)`` are joined by edges already, as in most files."""
+        pairs = np.sort(np.stack([ids, np.roll(ids, -1)], axis=1), axis=1)[: len(ids) if closed else len(ids) - 1]
+        keys = pairs[:, 0] * len(self._vertices) + pairs[:, 1]
+        found = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
+        return bool((self._keys[found] == keys).all())
+
+    def _between(self, start: int, end: int) -> list[int]:
+        """Vertices after ``start`` up to ``end``."""
+        # Paths between picks are short: looking no farther than a few times their distance spares the whole mesh.
+        reach = 3 * float(np.linalg.norm(self._vertices[start] - self._vertices[end]))
+        for limit in (max(reach, 1e-12), np.inf):
+            distance, before = dijkstra(self._graph, indices=start, return_predecessors=True, limit=limit)
+            if np.isfinite(distance[end]):
+                steps = [end]
+                while before[steps[-1]] != start and steps[-1] != start:
+                    steps.append(int(before[steps[-1]]))
+                return steps[::-1]
+        raise InputError(
+            f"no path of edges joins vertices {start} and {end}",
+            remedy="pick vertices of one connected part of the mesh",
+        )
+
+
 def shortest_edge_path(
     vertices: NDArray[np.float64], triangles: NDArray[np.integer], picks: Sequence[int] | Ids, closed: bool
 ) -> Ids:
@@ -81,54 +140,20 @@ def shortest_edge_path(
 
     Returns the ids ``(n,)``; a closed path does not repeat its first vertex.
     """
-    stops = [int(p) for p in picks]
-    if len(stops) < (3 if closed else 2):
-        raise InputError(
-            f"{len(stops)} picked vertices make no {'closed' if closed else 'open'} line",
-            remedy=f"pick at least {3 if closed else 2}",
-        )
-    edges = unique_edges(triangles)
-    lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
-    n = len(vertices)
-    graph = sp.csr_matrix((np.maximum(lengths, 1e-300), (edges[:, 0], edges[:, 1])), shape=(n, n))
-    path = [stops[0]]
-    for start, end in zip(stops, stops[1:] + stops[:1] if closed else stops[1:], strict=False):
-        path += _path_between(graph, vertices, start, end)
-    return np.array(path[:-1] if closed else path, dtype=np.int64)
-
-
-def _path_between(graph: sp.csr_matrix, vertices: NDArray[np.float64], start: int, end: int) -> list[int]:
-    """Vertices after ``start`` up to ``end``."""
-    # Paths between picks are short: looking no farther than a few times their distance spares the whole mesh.
-    reach = 3 * float(np.linalg.norm(vertices[start] - vertices[end]))
-    for limit in (max(reach, 1e-12), np.inf):
-        distance, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True, limit=limit)
-        if np.isfinite(distance[end]):
-            steps = [end]
-            while before[steps[-1]] != start and steps[-1] != start:
-                steps.append(int(before[steps[-1]]))
-            return steps[::-1]
-    raise InputError(
-        f"no path of edges joins vertices {start} and {end}", remedy="pick vertices of one connected part of the mesh"
-    )
+    return EdgePaths(vertices, triangles).through(picks, closed)
 
 
 def trace_lines(
     lines: Sequence[FeatureLine], vertices: NDArray[np.float64], triangles: NDArray[np.integer]
 ) -> list[FeatureLine]:
     """The same lines with consecutive vertices joined along edges; lines that are paths already stay as they are."""
-    edges = unique_edges(triangles)
-    n = len(vertices)
-    known = set((edges[:, 0] * n + edges[:, 1]).tolist())
-    traced = []
-    for line in lines:
-        pairs = np.sort(line.edges(), axis=1)
-        if all(int(a) * n + int(b) in known for a, b in pairs):
-            traced.append(line)
-            continue
-        path = shortest_edge_path(vertices, triangles, line.vertices, line.closed)
-        traced.append(FeatureLine(line.name, line.closed, path, line.target_vertices))
-    return traced
+    paths = EdgePaths(vertices, triangles)
+    return [
+        line
+        if paths.joins(line.vertices, line.closed)
+        else FeatureLine(line.name, line.closed, paths.through(line.vertices, line.closed), line.target_vertices)
+        for line in lines
+    ]
 
 
 def line_edges(lines: Sequence[FeatureLine]) -> Ids:

@@ -20,6 +20,7 @@ __all__ = ["Drawer", "Layout", "Timeline", "at", "draw"]
 _PAPER, _STRIP, _WINDOW = (24, 25, 28), (36, 38, 42), (62, 96, 140)
 _INK, _FAINT, _HEAD = (198, 201, 207), (92, 96, 103), (255, 206, 84)
 _SOURCE, _EDITED, _MARK, _HANDLE = (150, 156, 166), (255, 143, 31), (255, 143, 31), (150, 196, 255)
+_GAIN = (92, 214, 120)
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,8 @@ class Timeline:
     """What is shown.
 
     ``frame``, the edit's ``window`` or None, ``marked`` how much edits change each frame (0..1), the chosen basis's
-    weights of the source and edited, a title for the curves, and ``keys``, frames with a diamond.
+    weights of the source and edited, a title for the curves, and ``keys``, frames with a diamond. ``gain`` is another
+    curve ``(T,)``, of an edit's gain, drawn to a scale of its own.
     """
 
     frame: int
@@ -82,6 +84,7 @@ class Timeline:
     edited: NDArray[np.floating] | None = None
     title: str = ""
     keys: Sequence[int] = field(default=())
+    gain: NDArray[np.floating] | None = None
 
 
 def at(layout: Layout, window: tuple[int, int] | None, x: float, y: float) -> tuple[str, int]:
@@ -125,7 +128,7 @@ def _same(one: tuple[Layout, Timeline], other: tuple[Layout, Timeline]) -> bool:
     (layout, a), (other_layout, b) = one, other
     if layout != other_layout or (a.window, a.title, tuple(a.keys)) != (b.window, b.title, tuple(b.keys)):
         return False
-    pairs = ((a.source, b.source), (a.edited, b.edited), (a.marked, b.marked))
+    pairs = ((a.source, b.source), (a.edited, b.edited), (a.marked, b.marked), (a.gain, b.gain))
     return all(
         (p is None and q is None) or (p is not None and q is not None and np.array_equal(p, q)) for p, q in pairs
     )
@@ -184,19 +187,35 @@ def _draw_ruler(pen: ImageDraw.ImageDraw, layout: Layout, shown: Timeline) -> No
 
 
 def _draw_curves(pen: ImageDraw.ImageDraw, layout: Layout, shown: Timeline) -> None:
-    top, bottom = layout.curves
-    both = [curve for curve in (shown.source, shown.edited) if curve is not None and len(curve)]
     typeface = font(round(11 * layout.scale))
-    if both:
-        high = max(*(float(np.max(curve)) for curve in both), 1e-9)
-        width = max(1, round(1.4 * layout.scale))
-        for curve, color in ((shown.source, _SOURCE), (shown.edited, _EDITED)):
-            if curve is not None and len(curve) > 1:
-                y = bottom - (bottom - top) * np.asarray(curve) / high
-                points = [(layout.x(frame), float(value)) for frame, value in enumerate(y)]
-                pen.line(points, fill=color, width=width)
+    top = layout.curves[0] - 1
+    weights = [curve for curve in (shown.source, shown.edited) if curve is not None and len(curve)]
+    high = max((float(np.max(curve)) for curve in weights), default=0.0)
+    for curve, color in ((shown.source, _SOURCE), (shown.edited, _EDITED)):
+        if curve is not None:
+            _draw_curve(pen, layout, curve, (0.0, max(high, 1e-9)), color)
+    if shown.gain is not None and len(shown.gain):
+        low, high = min(float(shown.gain.min()), 0.0), max(float(shown.gain.max()), 2.0)
+        _draw_curve(pen, layout, np.ones(layout.n_frames), (low, high), _STRIP)  # at 1 nothing changes
+        _draw_curve(pen, layout, shown.gain, (low, high), _GAIN)
+        words = f"gain of the open edit: {low:g} to {high:g}"
+        pen.text((layout.right - 3 - text_width(words, typeface), top), words, font=typeface, fill=_GAIN)
     if shown.title:
-        pen.text((layout.left + 3, top - 1), shown.title, font=typeface, fill=_INK)
+        pen.text((layout.left + 3, top), shown.title, font=typeface, fill=_INK)
+
+
+def _draw_curve(
+    pen: ImageDraw.ImageDraw,
+    layout: Layout,
+    values: NDArray[np.floating],
+    limits: tuple[float, float],
+    color: tuple[int, int, int],
+) -> None:
+    (top, bottom), (low, high) = layout.curves, limits
+    heights = bottom - (bottom - top) * (np.asarray(values) - low) / (high - low)
+    points = [(layout.x(frame), float(y)) for frame, y in enumerate(heights)]
+    if len(points) > 1:
+        pen.line(points, fill=color, width=max(1, round(1.4 * layout.scale)))
 
 
 def _step(layout: Layout) -> int:

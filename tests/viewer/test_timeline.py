@@ -58,6 +58,20 @@ def test_curves_are_drawn_higher_where_weights_are_larger() -> None:
     assert bright[round(layout.x(50))] < bright[round(layout.x(30))] - 30
 
 
+def test_a_gain_is_drawn_to_its_own_scale_with_words() -> None:
+    layout = Layout(600, 112, 100)
+    gain = np.linspace(0.0, 2.0, 100)
+    shown = Timeline(0, 30.0, source=np.full(100, 9.0), gain=gain)
+    image = draw(layout, shown).astype(int)
+    green = (image[:, :, 1] > image[:, :, 0] + 60) & (image[:, :, 1] > image[:, :, 2] + 60)
+    rows = [np.flatnonzero(green[int(layout.curves[0]) + 14 :, round(layout.x(t))]) for t in (10, 40)]
+    top, bottom = layout.curves
+    for t, found in zip((10, 40), rows, strict=True):
+        wanted = bottom - (bottom - top) * gain[t] / 2 - int(top) - 14
+        assert abs(found.mean() - wanted) < 2
+    assert green[int(top) : int(top) + 10, 400:].any()  # its words
+
+
 def test_what_is_kept_between_frames_changes_nothing() -> None:
     layout, drawer = Layout(600, 112, 100), Drawer()
     curve = np.sin(np.arange(100.0)) ** 2
@@ -66,5 +80,7 @@ def test_what_is_kept_between_frames_changes_nothing() -> None:
         Timeline(60, 30.0, (5, 9), (), curve, None, "one"),
         Timeline(60, 30.0, (5, 10), (), curve, None, "one"),
         Timeline(61, 30.0, (5, 10), (), curve, 2 * curve, "one", (4,)),
+        Timeline(61, 30.0, (5, 10), (), curve, 2 * curve, "one", (4,), curve),
+        Timeline(61, 30.0, (5, 10), (), curve, 2 * curve, "one", (4,), 2 * curve),
     ):
         np.testing.assert_array_equal(drawer.draw(layout, shown), draw(layout, shown))

@@ -101,6 +101,10 @@ class Mode:
         """Frames to mark on the time line with a diamond."""
         return ()
 
+    def gain_curve(self) -> NDArray[np.float64] | None:
+        """How strong the open edit is over the take, ``(T,)``, where it says so."""
+        return None
+
     def undo(self) -> bool:
         """Take back the last thing that only this mode knows of; False leaves it to the journal."""
         return False

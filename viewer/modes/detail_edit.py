@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.detail_edit import DetailChange, SurfacePoint, painted
+from toolkit.detail_edit.window import gain_curve
 from toolkit.editing import EditSession
 from toolkit.errors import InputError
 from toolkit.progress import Progress
@@ -23,8 +24,8 @@ from viewer.modes.shared.brush import Brush
 from viewer.modes.shared.ground import Grounds
 from viewer.modes.shared.pointing import pointed_at, shows_result, surface_places
 from viewer.picking import Picker
-from viewer.state.app import CLICK
 from viewer.state.events import Hit, Key, Pointer
+from viewer.state.gestures import CLICK
 from viewer.state.marks import Mark
 from viewer.state.rows import Row
 
@@ -110,6 +111,13 @@ class DetailEditMode(DetailSteps):
     def keys(self) -> Sequence[tuple[str, str]]:
         """For the help."""
         return KEYS
+
+    def gain_curve(self) -> Array | None:
+        """Of a gain with keys: as the solver joins them."""
+        draft = self.draft
+        if draft is None or draft.action != "gain" or draft.details == "static" or not draft.gains:
+            return None
+        return gain_curve(draft.gains, self.app.play.n_frames)
 
     def ring(self, pane: int) -> PasteRing | None:
         """The handles of the copy, where it goes; None before that is pointed out."""

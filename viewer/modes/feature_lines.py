@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.feature_lines import FeatureLine, load_feature_lines, save_feature_lines, shortest_edge_path
-from toolkit.mesh.topology import unique_edges
+from toolkit.feature_lines import EdgePaths, FeatureLine, load_feature_lines, save_feature_lines
+from toolkit.progress import Progress
 from viewer.modes.base import Mode
 from viewer.modes.undo import UndoStack
 from viewer.state.events import Key, Pointer
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["FeatureLineMode"]
 
 Ids = NDArray[np.int64]
+_PathKey = tuple[str, tuple[int, ...], bool]
 _State = tuple[tuple[FeatureLine, ...], tuple[int, ...], str]
 
 
@@ -42,8 +43,8 @@ class FeatureLineMode(Mode):
         self._lines: tuple[FeatureLine, ...] = ()
         self._picks: tuple[int, ...] = ()
         self._side = "source"
-        self._path: dict[tuple[str, tuple[int, ...], bool], Ids] = {}
-        self._edges: dict[str, tuple[Any, Ids]] = {}
+        self._path: dict[_PathKey, Ids] = {}
+        self._tracing: tuple[FeatureLine, ...] | None = None
         self._undo: UndoStack[_State] = UndoStack()
         self.chosen = -1
         self._name = ""
@@ -100,7 +101,10 @@ class FeatureLineMode(Mode):
             ids = line.vertices if side == "source" else line.target_vertices
             if ids is None or len(ids) < 2 or ids.max() >= len(vertices):
                 continue
-            path = self._traced(side, tuple(ids.tolist()), line.closed)
+            path = self._path.get((side, tuple(ids.tolist()), line.closed))
+            if path is None:
+                self._trace_all()
+                path = ids
             chosen = index == self.chosen and not self._picks
             found.append(Curve(vertices[path], YELLOW if chosen else GREEN, 3.0 if chosen else 2.2, line.closed))
         if self._picks and self._side == side:
@@ -198,7 +202,7 @@ class FeatureLineMode(Mode):
 
     def refresh(self) -> None:
         """Read feature_lines.json."""
-        self._path.clear()
+        self._path, self._tracing = {}, None
         path = self.app.shot.feature_lines_path
         if path.exists():
             lines = tuple(load_feature_lines(path))
@@ -226,29 +230,38 @@ class FeatureLineMode(Mode):
         return True
 
     def _traced(self, side: str, picks: tuple[int, ...], closed: bool) -> Ids:
-        """The path of edges through some vertices; found once."""
+        """The path of edges through some vertices; found once, from what is known of the vertices before the last."""
         key = (side, picks, closed)
         if key not in self._path:
-            mesh = self.app.data.source if side == "source" else self.app.data.target
-            if len(picks) < 2 or self._is_path(side, picks, closed):
-                self._path[key] = np.array(picks, dtype=np.int64)
-            elif len(picks) > 2 and not closed and (side, picks[:-1], False) in self._path:
-                last = shortest_edge_path(mesh.vertices, mesh.triangles, picks[-2:], False)
-                self._path[key] = np.concatenate([self._path[(side, picks[:-1], False)], last[1:]])
+            begun = self._path.get((side, picks if closed else picks[:-1], False))
+            paths = self.app.nets.paths(side)
+            if begun is None or len(begun) < 2:
+                self._path[key] = _path_through(paths, picks, closed)
+            elif closed:
+                self._path[key] = np.concatenate([begun, paths.through((picks[-1], picks[0]), False)[1:-1]])
             else:
-                self._path[key] = shortest_edge_path(mesh.vertices, mesh.triangles, picks, closed)
+                self._path[key] = np.concatenate([begun, paths.through(picks[-2:], False)[1:]])
         return self._path[key]
 
-    def _is_path(self, side: str, picks: tuple[int, ...], closed: bool) -> bool:
-        """Whether consecutive vertices are joined by edges already, as in most files: nothing to search for then."""
-        mesh = self.app.data.source if side == "source" else self.app.data.target
-        if self._edges.get(side, (None, None))[0] is not mesh:
-            edges = unique_edges(mesh.triangles)
-            self._edges[side] = (mesh, edges[:, 0] * mesh.n_vertices + edges[:, 1])
-        ids = np.array(picks, dtype=np.int64)
-        pairs = np.sort(np.stack([ids, np.roll(ids, -1)], axis=1), axis=1)[: len(ids) if closed else len(ids) - 1]
-        keys, known = pairs[:, 0] * mesh.n_vertices + pairs[:, 1], self._edges[side][1]
-        return bool((known[np.minimum(np.searchsorted(known, keys), len(known) - 1)] == keys).all())
+    def _trace_all(self) -> None:
+        """Find the paths of all lines in the worker; their vertices are joined straight until then."""
+        wanted = [("source", line.vertices, line.closed) for line in self._lines]
+        wanted += [("target", ids, line.closed) for line in self._lines if (ids := line.target_vertices) is not None]
+        nets, known = self.app.nets, self._path
+        if self._tracing is self._lines or not all(nets.ready(side) for side, _, _ in wanted):
+            return
+        self._tracing = self._lines
+
+        def done(found: dict[_PathKey, Ids]) -> None:
+            if self._path is known:
+                known.update(found)
+                self.app.touch("overlay")
+
+        def work(progress: Progress) -> dict[_PathKey, Ids]:
+            keys = [(side, tuple(ids.tolist()), closed) for side, ids, closed in wanted]
+            return {key: _path_through(nets.paths(key[0]), key[1], key[2]) for key in keys if key not in known}
+
+        self.app.run_task("following the lines", work, done, slot="lines", quiet=True)
 
     def _finish(self, closed: bool) -> None:
         path = self._traced(self._side, self._picks, closed)
@@ -299,6 +312,11 @@ class FeatureLineMode(Mode):
 
 def _with(lines: tuple[FeatureLine, ...], index: int, line: FeatureLine) -> tuple[FeatureLine, ...]:
     return (*lines[:index], line, *lines[index + 1 :])
+
+
+def _path_through(paths: EdgePaths, picks: tuple[int, ...], closed: bool) -> Ids:
+    ids = np.array(picks, dtype=np.int64)
+    return ids if len(picks) < 2 or paths.joins(ids, closed) else paths.through(picks, closed)
 
 
 def _key(line: FeatureLine) -> tuple[Any, ...]:

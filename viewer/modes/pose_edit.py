@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["TOOLS", "PoseEdit"]
 
 Array = NDArray[np.float64]
+_Frames = dict[int, NDArray[np.float32]]
 
 TOOLS = (("move", "Move"), ("distance", "Distance"), ("fix", "Hold"))
 _GRIP = 11.0  # pixels round a handle that take hold of it
@@ -71,7 +72,7 @@ class PoseEdit(OpenEdit[PoseDraft]):
         self.beyond = Beyond(app)
         self._solved: PoseDraft | None = None
         self._base: Any = None
-        self._frames: dict[int, NDArray[np.float32]] = {}
+        self._frames: _Frames = {}
         self._grab: _Grab | None = None
         self._stroke: tuple[Pointer | None, PoseDraft | None, Picker] | None = None
 
@@ -139,9 +140,9 @@ class PoseEdit(OpenEdit[PoseDraft]):
     def start(self, frame: int, vertex: int) -> Array:
         """Where a vertex is without the open edit, ``(3,)``."""
         if self._base is None:
-            return np.asarray(self.app.editing.edited(frame)[vertex], dtype=np.float64)
+            return np.asarray(self.app.editing.frame(frame, edited=True)[vertex], dtype=np.float64)
         if frame not in self._frames:
-            while len(self._frames) >= _MOST_FRAMES:
+            while len(self._frames) > _MOST_FRAMES:
                 self._frames.pop(next(iter(self._frames)))
             self._frames[frame] = self._base.frame(frame)
         return np.asarray(self._frames[frame][vertex], dtype=np.float64)
@@ -346,16 +347,20 @@ class PoseEdit(OpenEdit[PoseDraft]):
         self.beyond.ask(draft)
         constraints, number = draft.constraints(), draft.instead_of
         parameters = replace(draft.parameters, most_rounds=1) if live else draft.parameters
+        known, wanted = (self._base, set(self._frames)), {*draft.frames[:_MOST_FRAMES], self.app.play.frame}
 
-        def work(session: EditSession, progress: Progress) -> tuple[tuple[Residual, ...], Any]:
+        def work(session: EditSession, progress: Progress) -> tuple[tuple[Residual, ...], Any, _Frames]:
             solved = session.draft_pose(constraints, parameters, instead_of=number, progress=progress)
-            return solved.residuals, session.committed_state(number)
+            base = session.committed_state(number)
+            missing = wanted - known[1] if base is known[0] else wanted
+            return solved.residuals, base, {frame: base.frame(frame) for frame in missing}
 
-        def done(found: tuple[tuple[Residual, ...], Any]) -> None:
+        def done(found: tuple[tuple[Residual, ...], Any, _Frames]) -> None:
             self.residuals, self._solved = found[0], draft
             if self._base is not found[1]:
                 self._base = found[1]
                 self._frames.clear()
+            self._frames.update(found[2])
             self.app.touch("overlay", "panel")
 
         def failed(error: Exception) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from toolkit.errors import InputError
 from viewer.stages_process import run_in_process
 from viewer.state.cameras import Viewpoint
-from viewer.state.events import Command, Key, PanelInput
+from viewer.state.events import Command, Key, PanelInput, TimelineInput
 from viewer.state.fields import MAPS
 from viewer.state.panes import PAIRS
 from viewer.state.playhead import SPEEDS
@@ -17,7 +17,7 @@ from viewer.state.playhead import SPEEDS
 if TYPE_CHECKING:
     from viewer.state.app import App
 
-__all__ = ["key", "panel", "run"]
+__all__ = ["key", "panel", "run", "timeline"]
 
 
 def key(app: App, event: Key) -> None:
@@ -58,6 +58,25 @@ def run(app: App, command: Command) -> None:
     if command.name not in _COMMANDS:
         raise InputError(f"there is no command {command.name!r}", remedy=f"commands are {', '.join(_COMMANDS)}")
     _COMMANDS[command.name](app, command.argument)
+
+
+def timeline(app: App, event: TimelineInput) -> None:
+    """The time line was used: another frame, or the window's ends."""
+    if event.what == "scrub":
+        app.play.playing = False
+        app.go_to_frame(event.frame)
+        return
+    first, last = app.play.window or (0, app.play.n_frames - 1)
+    if event.what == "first":
+        app.play.set_window(min(event.frame, last), last)
+    elif event.what == "last":
+        app.play.set_window(first, max(event.frame, first))
+    elif event.what == "window":
+        half = (last - first) // 2
+        start = min(max(event.frame - half, 0), app.play.n_frames - 1 - (last - first))
+        app.play.set_window(start, start + last - first)
+    app.mode.panel("window", app.play.window, event.grip == "release")
+    app.touch("timeline", "panel")
 
 
 def undo(app: App, _: Any = None) -> None:

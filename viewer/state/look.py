@@ -5,22 +5,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from viewer.state.fields import MAPS, Field, scaled
-from viewer.state.panes import PAIRS, Surface
+from viewer.state.fields import MAPS
+from viewer.state.panes import PAIRS
 from viewer.state.rows import Button, Buttons, Choice, Heading, Note, Row, Slider
 from viewer.timeline import Timeline
 
 if TYPE_CHECKING:
     from viewer.state.app import App
 
-__all__ = ["field_of", "help_lines", "panel_rows", "sensible_map", "skin_of", "status_line", "timeline_of"]
+__all__ = ["help_lines", "panel_rows", "status_line", "timeline_of"]
 
 _MODES_IN_A_ROW = 4
-_INSIDE = 0.25
-# Of the face's height: what a registration may well be off by.
-_FAR = 0.004
 
 
 def panel_rows(app: App) -> list[Row]:
@@ -79,7 +75,7 @@ def advice(app: App) -> str:
 def _view_rows(app: App) -> list[Row]:
     pairs = tuple((pair.name, pair.words) for pair in PAIRS.values() if app.can_show(pair))
     rows: list[Row] = [Heading("View"), Choice("pair", "show", pairs, app.pair.name)]
-    maps = tuple(entry for entry in MAPS if _map_possible(app, entry[0]))
+    maps = tuple(entry for entry in MAPS if app.maps.possible(entry[0]))
     rows.append(Choice("map", "colours", maps, app.map))
     rows.append(
         Buttons(
@@ -133,47 +129,17 @@ def timeline_of(app: App) -> Timeline:
         title = f"basis {app.basis + 1}: weight of the source" + (
             " (grey), edited (orange)" if edited is not None else ""
         )
-    keys = app.mode.key_frames()
     return Timeline(
-        app.play.frame, app.play.fps, app.play.window, app.editing.moved_share(), source, edited, title, keys
+        app.play.frame,
+        app.play.fps,
+        app.play.window,
+        app.editing.moved_share(),
+        source,
+        edited,
+        title,
+        app.mode.key_frames(),
+        app.mode.gain_curve(),
     )
-
-
-def sensible_map(app: App, name: str) -> str:
-    """The map that a pair comes with, or one that says something."""
-    if name == "difference" and (app.editing.snapshot is None or not app.editing.snapshot.changed):
-        return "coating"
-    return name
-
-
-def field_of(app: App, name: str) -> Field | None:
-    """The values of a map on the right pane's surface at this frame; None where they are not known (yet)."""
-    surface = app.surface(1)
-    if surface.mesh != "source":
-        return None
-    if name == "distance":
-        if not app.data.has_registration:
-            return None
-        return app.kept_field(
-            ("distance",),
-            lambda: scaled("distance", app.data.distance, "the target's unit", _FAR * app.data.target_framing.height),
-        )
-    if name == "difference" and app.data.has_result:
-        before, after = app.surface_named("before"), app.surface_named("result")
-        apart = np.linalg.norm(after.vertices - before.vertices, axis=1)
-        return scaled("difference", apart, "the target's unit")
-    if name == "coating":
-        return app.coating_field(surface)
-    return None
-
-
-def skin_of(app: App, surface: Surface, color: tuple[float, float, float]) -> NDArray[np.float32]:
-    """The colour of a face, ``(1, 3)``, or ``(V, 3)`` with the inside of mouth and eyes darker, once it is known."""
-    plain = np.array([color], np.float32)
-    inside = app.data.interior if surface.mesh == "source" else None
-    if inside is None or len(inside) != len(surface.vertices):
-        return plain
-    return np.where(inside[:, None], np.float32(_INSIDE) * plain, plain)
 
 
 def help_lines(app: App) -> list[tuple[str, str]]:
@@ -199,9 +165,3 @@ def help_lines(app: App) -> list[tuple[str, str]]:
         ("?", "these keys"),
     ]
     return lines
-
-
-def _map_possible(app: App, name: str) -> bool:
-    if name in ("difference", "coating"):
-        return app.data.has_result
-    return name == "none" or app.data.has_registration

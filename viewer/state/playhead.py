@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 __all__ = ["SPEEDS", "Playhead"]
@@ -41,24 +42,26 @@ class Playhead:
         if self.playing and not self.loop and self.frame == self.n_frames - 1:
             self.go(0)
 
-    def advance(self, seconds: float) -> bool:
-        """Let time pass; True if the frame changed."""
+    def advance(self, seconds: float, ready: Callable[[int], bool] = lambda frame: True) -> bool:
+        """Let time pass; True if the frame changed.
+
+        Frames that are not ``ready`` are not gone to: rather it plays slower.
+        """
         if not self.playing:
             return False
         self._rest += seconds * self.fps * self.speed
         whole = int(self._rest)
-        if not whole:
-            return False
         self._rest -= whole
-        following = self.frame + whole
-        if following >= self.n_frames:
-            if self.loop:
-                following %= self.n_frames
-            else:
-                following, self.playing = self.n_frames - 1, False
-        changed = following != self.frame
-        self.frame = following
-        return changed
+        before = self.frame
+        self.frame = next((frame for frame in map(self._after, range(whole, 0, -1)) if ready(frame)), before)
+        if not self.loop and self.frame == self.n_frames - 1:
+            self.playing = False
+        return self.frame != before
+
+    def _after(self, count: int) -> int:
+        """The frame that many frames on."""
+        following = self.frame + count
+        return following % self.n_frames if self.loop else min(following, self.n_frames - 1)
 
     def set_window(self, first: int, last: int) -> None:
         """The edit's window; ends in any order, held within the take."""

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, TimeoutError
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,10 @@ __all__ = ["Editing", "Snapshot"]
 
 _CACHE_BYTES = 256 * 2**20
 _AHEAD = 8
+_MOMENT = 0.03
+"""Seconds that the main thread waits for a frame: most are there by then, and nobody notices."""
+
+Key = tuple[int, bool, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +69,8 @@ class Editing:
         self.opening = False
         self.problem = ""
         self._builder = ThreadPoolExecutor(1, "viewer-frames")
-        self._asked: dict[tuple[int, bool, int], Future[NDArray[np.float32]]] = {}
-        self._frames: OrderedDict[tuple[int, bool, int], NDArray[np.float32]] = OrderedDict()
+        self._asked: dict[Key, Future[NDArray[np.float32]]] = {}
+        self._frames: OrderedDict[Key, NDArray[np.float32]] = OrderedDict()
 
     # -- life -----------------------------------------------------------------------------------------------------
 
@@ -107,43 +112,71 @@ class Editing:
 
     # -- frames ---------------------------------------------------------------------------------------------------
 
-    def edited(self, frame: int) -> NDArray[np.float32]:
-        """A frame with all active edits and the draft; as on disk while no session is open."""
-        return self._frame(frame, edited=True)
-
-    def unedited(self, frame: int) -> NDArray[np.float32]:
-        """A frame of the automatic result."""
-        return self._frame(frame, edited=False)
-
-    def build_ahead(self) -> None:
-        """While it plays: build the next edited frames in a thread, so that the window need not."""
-        shown, play = self.snapshot, self._app.play
-        if shown is None or not shown.changed:
-            return
-        for key in [key for key, future in self._asked.items() if future.done()]:
-            self._keep(key, self._asked.pop(key).result())
-        for step in range(1, _AHEAD + 1):
-            frame = (play.frame + step) % play.n_frames
-            key = (id(shown.shown), True, frame)
-            if key not in self._frames and key not in self._asked and len(self._asked) < _AHEAD:
-                self._asked[key] = self._builder.submit(shown.shown.frame, frame)
-
-    def _frame(self, frame: int, edited: bool) -> NDArray[np.float32]:
-        shown = self.snapshot
-        if shown is None or (not shown.edits and not shown.has_draft):
+    def frame(self, frame: int, edited: bool) -> NDArray[np.float32]:
+        """A frame of the result, with all active edits and the draft or without; waits until it is built."""
+        state = self._state(edited)
+        if state is None:
             return np.asarray(self._app.data.result[frame])
-        state = shown.shown if edited else shown.base
         key = (id(state), edited, frame)
         if key not in self._frames:
-            future = self._asked.pop(key, None)
-            # Waiting for one that is being built is no longer than building it.
-            self._keep(key, state.frame(frame) if future is None or future.cancel() else future.result())
+            self._keep(key, self._ask(key, state).result())
+        return self._known(key)
+
+    def frame_soon(self, frame: int, edited: bool) -> NDArray[np.float32] | None:
+        """The same; None where that would take longer than a moment, `ready` tells when it is there."""
+        state = self._state(edited)
+        if state is None:
+            return np.asarray(self._app.data.result[frame])
+        key = (id(state), edited, frame)
+        if key not in self._frames and key not in self._asked:
+            self._drop_asked()  # others were for frames that nobody looks at any more
+            with suppress(TimeoutError):
+                self._ask(key, state).result(_MOMENT)
+        return self._known(key) if self.ready(frame, edited) else None
+
+    def ready(self, frame: int, edited: bool) -> bool:
+        """Whether a frame can be shown at once."""
+        state = self._state(edited)
+        key = (id(state), edited, frame)
+        if state is not None and key in self._asked and self._asked[key].done():
+            self._keep(key, self._asked.pop(key).result())
+        return state is None or key in self._frames
+
+    def build_ahead(self, wanted: Iterable[bool]) -> None:
+        """While it plays: build the next frames in a thread; ``wanted`` True for edited ones, False for the others."""
+        play = self._app.play
+        for step in range(1, _AHEAD + 1):
+            frame = (play.frame + step) % play.n_frames
+            for edited in wanted:
+                state = self._state(edited)
+                if state is not None and not self.ready(frame, edited) and len(self._asked) < 2 * _AHEAD:
+                    self._ask((id(state), edited, frame), state)
+
+    def _state(self, edited: bool) -> Any:
+        """What builds the frames; None where they are on disk."""
+        shown = self.snapshot
+        if shown is None or (not shown.edits and not shown.has_draft):
+            return None
+        return shown.shown if edited else shown.base
+
+    def _ask(self, key: Key, state: Any) -> Future[NDArray[np.float32]]:
+        if key not in self._asked:
+            self._asked[key] = self._builder.submit(state.frame, key[2])
+        return self._asked[key]
+
+    def _drop_asked(self) -> None:
+        """Frames that are not begun yet are not built."""
+        for key in [key for key, future in self._asked.items() if future.cancel()]:
+            del self._asked[key]
+
+    def _known(self, key: Key) -> NDArray[np.float32]:
         self._frames.move_to_end(key)
         return self._frames[key]
 
-    def _keep(self, key: tuple[int, bool, int], shape: NDArray[np.float32]) -> None:
+    def _keep(self, key: Key, shape: NDArray[np.float32]) -> None:
+        self._asked.pop(key, None)
         self._frames[key] = shape
-        most = max(2 * _AHEAD, _CACHE_BYTES // max(shape.nbytes, 1))
+        most = max(4 * _AHEAD, _CACHE_BYTES // max(shape.nbytes, 1))
         while len(self._frames) > most:
             self._frames.popitem(last=False)
 
@@ -181,7 +214,7 @@ class Editing:
             if session is not self.session:
                 return
             self._take(snapshot)
-            self._frames[(id(snapshot.shown), True, frame)] = shape
+            self._keep((id(snapshot.shown), True, frame), shape)
             self._app.solved(seconds)
             done(result)
             self._app.touch("panel")
@@ -191,8 +224,7 @@ class Editing:
     def _take(self, snapshot: Snapshot) -> None:
         old = self.snapshot
         self.snapshot = snapshot
-        for future in self._asked.values():
-            future.cancel()
+        self._drop_asked()
         self._asked.clear()
         # Only frames of states that are still shown are worth keeping; ids of dead ones may come again.
         kept = {id(snapshot.shown), id(snapshot.base)}

@@ -11,8 +11,19 @@ from numpy.typing import NDArray
 from open3d.visualization import gui, rendering
 
 from toolkit.rendering import Camera
+from viewer.layout import Rectangle
 
-__all__ = ["DynamicMesh", "gui", "image_of", "key_name", "modifiers_of", "new_scene", "quit_later", "set_camera"]
+__all__ = [
+    "DynamicMesh",
+    "gui",
+    "image_of",
+    "key_name",
+    "modifiers_of",
+    "new_scene",
+    "quit_later",
+    "rectangle",
+    "set_camera",
+]
 
 _RING = 3
 """Buffers in turn: Open3D reads the arrays after the call, in its own thread, and takes no copy."""
@@ -36,10 +47,10 @@ class DynamicMesh:
         n_vertices: int,
     ) -> None:
         self._scene, self.name = scene, name
-        # A bounding box without a volume is refused, with the end of the process.
-        corners = np.array([[-1, -1, -1], [1, 1, 1]], np.float32)
-        self.positions = [np.resize(corners, (n_vertices, 3)).astype(np.float32) for _ in range(_RING)]
+        self.positions = [np.zeros((n_vertices, 3), np.float32) for _ in range(_RING)]
         self.colors = [np.zeros((n_vertices, 3), np.float32) for _ in range(_RING)]
+        # A bounding box without a volume is refused, with the end of the process.
+        self.positions[0][:2] = [[-1, -1, -1], [1, 1, 1]]
         self._clouds = [_cloud(p, c) for p, c in zip(self.positions, self.colors, strict=True)]
         self._turn = 0
         self._mesh = _geometry(self.positions[0], self.colors[0], triangles)
@@ -91,6 +102,11 @@ def set_camera(widget: Any, camera: Camera) -> None:
     target, position, up = (np.asarray(v, dtype=np.float32) for v in (camera.target, camera.position, camera.up))
     native.look_at(target, position, up)
     widget.force_redraw()
+
+
+def rectangle(place: Rectangle) -> Any:
+    """A place as Open3D has it."""
+    return gui.Rect(place.x, place.y, place.width, place.height)
 
 
 def image_of(pixels: NDArray[np.uint8]) -> Any:

@@ -8,16 +8,17 @@ from typing import Any
 import numpy as np
 
 from viewer import overlay, shading
+from viewer.layout import Rectangle
 from viewer.state.app import App
 from viewer.state.cameras import pixel_ray
 from viewer.state.events import Pointer
 from viewer.state.marks import Disc, Text
 from viewer.view import open3d_calls as native
 from viewer.view.open3d_calls import DynamicMesh, gui
+from viewer.view.wires import Wires
 
 __all__ = ["Pane"]
 
-_WIRE = np.array([0.06, 0.06, 0.07], np.float32)
 _IVORY = np.array([[0.86, 0.85, 0.82]], np.float32)
 _LABELS = 96
 
@@ -34,12 +35,10 @@ class Pane:
         self.app, self.index, self._send = app, index, send
         self.widget, self.scene = native.new_scene(window)
         self._zoom = window.theme.font_size / 16
-        self.widget.set_on_mouse(self._mouse)
         self._face: DynamicMesh | None = None
         self._triangles: Any = None
         self._normals = np.zeros((0, 3), np.float32)
-        self._wires: DynamicMesh | None = None
-        self._edges = np.zeros((0, 2), np.int32)
+        self._wires: Wires | None = None
         self._extras: DynamicMesh | None = None
         self._extra_triangles: Any = None
         self._overlay: DynamicMesh | None = None
@@ -51,10 +50,10 @@ class Pane:
 
     # -- drawing --------------------------------------------------------------------------------------------------
 
-    def place(self, frame: Any) -> None:
+    def place(self, frame: Rectangle) -> None:
         """Put the pane into a rectangle of the window."""
-        self.widget.frame = frame
-        self.app.pane_sizes[self.index] = (max(int(frame.width), 1), max(int(frame.height), 1))
+        self.widget.frame = native.rectangle(frame)
+        self.app.pane_sizes[self.index] = frame.size
 
     def draw_camera(self) -> None:
         """Look from where the application says."""
@@ -80,7 +79,7 @@ class Pane:
             soft=app.field(self.index) is not None,
         )
         self._face.show()
-        self._draw_wires(positions)
+        self._draw_wires(positions, camera)
         self._draw_extras(camera)
         self.widget.force_redraw()
 
@@ -108,10 +107,8 @@ class Pane:
         return DynamicMesh(self.scene, name, triangles, n_vertices)
 
     def _replace_face(self, triangles: Any, n_vertices: int) -> None:
-        for mesh in (self._face, self._wires):
-            if mesh is not None:
-                mesh.remove()
-        self._wires = None
+        if self._face is not None:
+            self._face.remove()
         self._face = self._mesh("face", triangles, n_vertices)
         self._triangles = triangles
         self._normals = np.zeros((n_vertices, 3), np.float32)
@@ -132,20 +129,18 @@ class Pane:
         shading.bake(positions, found[1], _IVORY, self.app.light, camera, np.empty_like(positions), colors)
         self._extras.show()
 
-    def _draw_wires(self, positions: Any) -> None:
-        if not self.app.wireframe:
-            if self._wires is not None:
-                self._wires.remove()
-                self._wires = None
+    def _draw_wires(self, positions: Any, camera: Any) -> None:
+        edges = self.app.edges(self.index) if self.app.wireframe else None
+        if self._wires is not None and self._wires.edges is not edges:
+            self._wires.remove()
+            self._wires = None
+        if edges is None:
             return
         if self._wires is None:
-            self._edges = self.app.edges(self.index)
-            self._wires = self._mesh("wires", overlay.wire_triangles(len(self._edges)), 4 * len(self._edges))
-        to_positions, to_colors = self._wires.next_buffers()
-        to_colors[:] = _WIRE
-        camera, height = self.app.framing_camera(self.index), self.app.pane_sizes[self.index][1]
-        overlay.wires(positions, self._edges, camera, height, to_positions)
-        self._wires.show()
+            self._wires = Wires(self.scene, edges)
+        self._wires.draw(positions, camera, self.app.pane_sizes[self.index][1])
+        if not self._wires.whole:
+            self.app.touch("faces")
 
     def _draw_labels(self, marks: Any) -> None:
         """Numbers beside discs, of those that the face does not hide."""
@@ -167,8 +162,8 @@ class Pane:
 
     # -- events ---------------------------------------------------------------------------------------------------
 
-    def _mouse(self, event: Any) -> Any:
-        """Every event is used up here: the camera is ours too."""
+    def mouse(self, event: Any) -> Any:
+        """An event of the mouse over the pane; every one is used up here: the camera is ours too."""
         # Events are in the window's coordinates, whatever the widget: the right pane is the one that would suffer.
         x, y = float(event.x - self.widget.frame.x), float(event.y - self.widget.frame.y)
         kinds = gui.MouseEvent.Type

@@ -6,9 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 from viewer import timeline
+from viewer.layout import Rectangle
 from viewer.state.app import App
 from viewer.state.events import Command, Event, TimelineInput
 from viewer.state.playhead import SPEEDS
+from viewer.view import open3d_calls as native
 from viewer.view.open3d_calls import gui, image_of
 
 __all__ = ["TimeBar"]
@@ -55,10 +57,10 @@ class TimeBar:
         self._size = (0, 0)
         self._grip = ""
 
-    def place(self, buttons: Any, picture: Any) -> None:
+    def place(self, buttons: Rectangle, picture: Rectangle) -> None:
         """Put both into their rectangles."""
-        self.buttons.frame, self.picture.frame = buttons, picture
-        self._size = (max(int(picture.width), 64), max(int(picture.height), 32))
+        self.buttons.frame, self.picture.frame = native.rectangle(buttons), native.rectangle(picture)
+        self._size = picture.size
 
     def draw(self) -> None:
         """Words, buttons and the picture."""

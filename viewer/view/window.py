@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from viewer.layout import PANEL, Rectangle, arrange
 from viewer.legend import draw_legend
 from viewer.script import Player, Recorder
+from viewer.stalls import StallWatch
 from viewer.state.app import App
 from viewer.state.events import Event, Key
 from viewer.state.look import help_lines
@@ -27,8 +29,6 @@ __all__ = ["Window"]
 
 log = logging.getLogger(__name__)
 
-_PANEL_EM = 24.0
-_TIMES_EM, _PICTURE_EM, _STATUS_EM = 2.1, 7.0, 1.9
 # Seconds after a change when it is drawn again: a busy renderer leaves frames out, and the last one would be seen
 # only at the next event.
 _AGAIN = (0.05, 0.15, 0.4, 1.0, 2.0)
@@ -54,9 +54,11 @@ class Window:
         title = f"Mien: {app.shot.path.resolve().name}"
         self.window = self.application.create_window(title, *size)
         self._em = self.window.theme.font_size
+        self.stalls = StallWatch()
+        self._timed_step = self.stalls.timed("tick", self._step)
         self.panes = [Pane(self.window, app, index, self.send) for index in (0, 1)]
-        self.panel = Panel(self.window, self.send, _PANEL_EM)
-        self.times = TimeBar(self.window, app, self.send)
+        self.panel = Panel(self.window, self.stalls.timed("panel", self.send), PANEL)
+        self.times = TimeBar(self.window, app, self.stalls.timed("time line", self.send))
         self._titles = [gui.Label("") for _ in self.panes]
         # What no widget covers is never wiped.
         self._floor = gui.Vert()
@@ -66,6 +68,7 @@ class Window:
         self._progress = gui.ProgressBar()
         self._legend = gui.ImageWidget()
         self._legend_of: Any = None
+        self._places = arrange(Rectangle(0, 0, *size), self._em)
         self._help = gui.Vert(0, gui.Margins(1.2 * self._em, 0.8 * self._em, 1.2 * self._em, 0.8 * self._em))
         self._help_proxy = gui.WidgetProxy()
         self._build()
@@ -75,7 +78,7 @@ class Window:
         self._again: list[float] = []
         self._quitting = False
         self._stale, self._was_busy = True, False
-        self._ticks, self.slowest = 0, 0.0
+        self._ticks = 0
 
     def run(self) -> None:
         """Until the window is closed."""
@@ -119,6 +122,7 @@ class Window:
 
     def _build(self) -> None:
         for pane in self.panes:
+            pane.widget.set_on_mouse(self.stalls.timed("pointer", pane.mouse))
             self.window.add_child(pane.widget)
         self._help.add_child(self._help_proxy)
         self._help.background_color = gui.Color(0.08, 0.085, 0.1, 0.96)
@@ -131,55 +135,46 @@ class Window:
             self._floor, self._status, self._progress, self._legend, self._help,
         ):  # fmt: skip
             self.window.add_child(widget)
-        self.window.set_on_layout(self._layout)
+        self.window.set_on_layout(self.stalls.timed("layout", self._layout))
         self.window.set_on_tick_event(self._tick)
-        self.window.set_on_key(self._key)
+        self.window.set_on_key(self.stalls.timed("key", self._key))
         self.window.set_on_close(self._closing)
 
     def _layout(self, context: Any) -> None:
-        em, whole = self._em, self.window.content_rect
-        wide = int(_PANEL_EM * em)
-        left, top, width = whole.x, whole.y, max(whole.width - wide, 200)
-        status, picture, times = (int(part * em) for part in (_STATUS_EM, _PICTURE_EM, _TIMES_EM))
-        high = max(whole.height - status - picture - times, 100)
-        half = width // 2
-        self.panes[0].place(gui.Rect(left, top, half - 1, high))
-        self.panes[1].place(gui.Rect(left + half + 1, top, width - half - 1, high))
-        self.panel.widget.frame = gui.Rect(left + width, top, wide, whole.height - status)
-        y = top + high
-        self.times.place(gui.Rect(left, y, width, times), gui.Rect(left, y + times, width, picture))
-        bar = int(11 * em)
-        self._floor.frame = gui.Rect(left, y + times + picture, whole.width, status)
-        self._status.frame = gui.Rect(left + int(0.5 * em), y + times + picture, whole.width - bar - int(em), status)
-        self._progress.frame = gui.Rect(
-            whole.get_right() - bar, y + times + picture + int(0.4 * em), bar - int(0.5 * em), status - int(0.8 * em)
-        )
-        for pane, label in zip(self.panes, self._titles, strict=True):
-            frame = pane.widget.frame
-            label.frame = gui.Rect(
-                frame.x + int(0.6 * em), frame.y + int(0.3 * em), frame.width - int(em), int(1.6 * em)
-            )
-        self._place_legend()
+        whole = self.window.content_rect
+        self._places = places = arrange(Rectangle(whole.x, whole.y, whole.width, whole.height), self._em)
+        for pane, label, frame, title in zip(self.panes, self._titles, places.panes, places.titles, strict=True):
+            pane.place(frame)
+            label.frame = native.rectangle(title)
+        self.times.place(places.buttons, places.times)
+        for widget, place in (
+            (self.panel.widget, places.panel), (self._floor, places.floor), (self._status, places.status),
+            (self._progress, places.progress), (self._legend, places.legend),
+        ):  # fmt: skip
+            widget.frame = native.rectangle(place)
         need = self._help.calc_preferred_size(context, gui.Widget.Constraints())
-        self._help.frame = gui.Rect(left + int(2 * em), top + int(2 * em), need.width, need.height)
+        margin = int(1.6 * self._em)
+        self._help.frame = gui.Rect(whole.x + margin, whole.y + margin, need.width, need.height)
         self._settle, self._stale = 3, True
         self.app.touch("camera", "faces", "overlay", "timeline")
-
-    def _place_legend(self) -> None:
-        em, frame = self._em, self.panes[1].widget.frame
-        width, height = int(17 * em), int(3.6 * em)
-        self._legend.frame = gui.Rect(
-            frame.get_right() - width - int(0.6 * em), frame.get_bottom() - height - int(0.6 * em), width, height
-        )
 
     # -- drawing --------------------------------------------------------------------------------------------------
 
     def _tick(self) -> bool:
+        drawn = self._timed_step()
+        if self._state_file is not None:
+            self._write_state(drawn)
+        return drawn
+
+    def _step(self) -> bool:
+        """Let time pass, and draw what changed; True if anything did."""
         now = time.monotonic()
         passed, self._last = now - self._last, now
         if self._player is not None:
             self._player.play(self.send, self.app, self)
         self._ticks += 1
+        if self._ticks == _WARM:
+            self.stalls.begin()
         self.panel.tick()
         self.app.tick(min(passed, 0.5))
         if self.app.quit_asked and not self._quitting:
@@ -197,10 +192,6 @@ class Window:
             self._again = [when for when in self._again if when > now]
             for pane in self.panes:
                 pane.widget.force_redraw()
-        if self.warm:
-            self.slowest = max(self.slowest, time.monotonic() - now)
-        if self._state_file is not None:
-            self._write_state(bool(changes))
         return bool(changes) or again
 
     def _write_state(self, changed: bool) -> None:
@@ -232,10 +223,9 @@ class Window:
             label.text = words
         field = self.app.field(1)
         self._legend.visible = field is not None
-        if field is not None and self._legend_of != field.scale:
-            self._legend_of = field.scale
-            self._legend.update_image(image_of(draw_legend(field.scale, int(17 * self._em), self._em / 16)))
-            self._place_legend()
+        if field is not None and self._legend_of != (field.scale, self._places.legend):
+            self._legend_of = (field.scale, self._places.legend)
+            self._legend.update_image(image_of(draw_legend(field.scale, self._places.legend.width, self._em / 16)))
 
     def _draw_panel(self) -> None:
         anew = self.panel.show(self.app.rows())

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import random
 import shutil
-import struct
 import subprocess
 import sys
 import time
@@ -18,6 +16,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from benchmarks._viewer.screen import Screen, screen
 from data.samples import SamplePaths, build_samples
 from toolkit.errors import InputError
 from toolkit.shot import Shot, ShotConfig, SourceInput, TargetInput, save_config
@@ -29,37 +28,26 @@ PATIENCE = 90.0
 
 
 @pytest.fixture(scope="session")
-def xserver(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
-    """Display and the folder of its frame buffer."""
+def xserver(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
+    """A screen that nobody sees."""
     missing = [name for name in ("Xvfb", "xdotool") if shutil.which(name) is None]
     if missing:
         words = f"{' and '.join(missing)} missing: apt-get install -y xvfb xdotool"
         if os.environ.get("CI"):
             pytest.fail(words)
         pytest.skip(words)
-    folder = tmp_path_factory.mktemp("screen")
-    for number in random.SystemRandom().sample(range(100, 10000), 20):
-        # With -displayfd the server takes no lock, and another one may take its place.
-        command = ["Xvfb", f":{number}", "-noreset", "-screen", "0", "1280x900x24", "-fbdir", str(folder)]
-        server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        until = time.monotonic() + 20
-        while server.poll() is None and time.monotonic() < until:
-            if Path(f"/tmp/.X11-unix/X{number}").exists():
-                yield f":{number}", folder / "Xvfb_screen0"
-                server.terminate()
-                server.wait(10)
-                return
-            time.sleep(0.05)
-    pytest.fail("Xvfb does not start")
+    with screen(tmp_path_factory.mktemp("screen"), (1280, 900)) as shown:
+        yield shown
 
 
 class Desk:
     """The viewer on one shot, and the hands of its user. Places are pixels of a pane or of the window."""
 
-    def __init__(self, shot: Path, display: str, buffer: Path, folder: Path, size: tuple[int, int]) -> None:
-        self.shot, self._buffer, self._folder = shot, buffer, folder
+    def __init__(self, shot: Path, shown: Screen, folder: Path, size: tuple[int, int]) -> None:
+        self.shot, self._shown, self._folder = shot, shown, folder
         self._state_file, self._log = folder / "state.json", folder / "viewer.log"
-        self._environment = {**os.environ, "DISPLAY": display, "OMP_NUM_THREADS": "1", "XDG_RUNTIME_DIR": str(folder)}
+        own = {"DISPLAY": shown.display, "OMP_NUM_THREADS": "1", "XDG_RUNTIME_DIR": str(folder)}
+        self._environment = {**os.environ, **own}
         self._state_file.unlink(missing_ok=True)
         command = [sys.executable, "-m", "viewer", str(shot), "--state", str(self._state_file)]
         command += ["--size", f"{size[0]}x{size[1]}", "--record", str(folder / "events.jsonl")]
@@ -104,14 +92,10 @@ class Desk:
     def picture(self, name: str) -> np.ndarray:
         """A screenshot (h, w, 3), kept as a file; the renderer has to catch up first."""
         time.sleep(0.4)
-        data = self._buffer.read_bytes()
-        header = struct.unpack(">25I", data[:100])
-        start, width, height, row = header[0] + 12 * header[19], header[4], header[5], header[12]
-        pixels = np.frombuffer(data, np.uint8, row * height, start).reshape(height, row)[:, : 4 * width]
-        image = pixels.reshape(height, width, 4)[..., 2::-1]
+        image = self._shown.grab()
         folder = Path(os.environ.get("MIEN_SCREENSHOTS", self._folder))
         folder.mkdir(parents=True, exist_ok=True)
-        Image.fromarray(np.ascontiguousarray(image)).save(folder / f"{name}.png")
+        Image.fromarray(image).save(folder / f"{name}.png")
         return image
 
     # -- hands ----------------------------------------------------------------------------------------------------
@@ -173,14 +157,14 @@ class Desk:
 
 
 @pytest.fixture
-def sit_down(xserver: tuple[str, Path], tmp_path: Path) -> Iterator[Callable[..., Desk]]:
+def sit_down(xserver: Screen, tmp_path: Path) -> Iterator[Callable[..., Desk]]:
     """``sit_down(shot)``: open the viewer."""
     desks: list[Desk] = []
 
     def start(shot: Path, size: tuple[int, int] = (1200, 800)) -> Desk:
         folder = tmp_path / f"desk{len(desks)}"
         folder.mkdir()
-        desks.append(Desk(shot, *xserver, folder, size))
+        desks.append(Desk(shot, xserver, folder, size))
         return desks[-1]
 
     yield start
@@ -190,7 +174,7 @@ def sit_down(xserver: tuple[str, Path], tmp_path: Path) -> Iterator[Callable[...
 
 
 @pytest.fixture(scope="session")
-def samples(tmp_path_factory: pytest.TempPathFactory, xserver: tuple[str, Path]) -> SamplePaths:
+def samples(tmp_path_factory: pytest.TempPathFactory, xserver: Screen) -> SamplePaths:
     """The coarsest samples."""
     try:
         return build_samples(tmp_path_factory.mktemp("samples"), lambda *_: None, ["asian_female"], 0)

@@ -27,6 +27,18 @@ def test_loop_and_end() -> None:
     assert (play.frame, play.playing) == (0, True)
 
 
+def test_rather_slower_than_to_frames_that_are_not_ready() -> None:
+    play, built = Playhead(100, 30.0, frame=10), {11, 12}
+    play.toggle()
+    assert play.advance(5.5 / 30, built.__contains__)
+    assert play.frame == 12
+    assert not play.advance(9 / 30, built.__contains__)
+    assert play.frame == 12
+    built |= set(range(100))
+    assert play.advance(1 / 30, built.__contains__)
+    assert play.frame == 13
+
+
 def test_speed_step_and_window() -> None:
     play = Playhead(100, 30.0, speed=0.5)
     play.toggle()

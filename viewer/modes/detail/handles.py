@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.detail_edit import SurfacePoint
-from viewer.modes.shared.pointing import normal_at, on_plane, surface_places
-from viewer.state.events import Hit, Pointer
+from viewer.modes.shared.pointing import on_plane, surface_places
+from viewer.state.events import Pointer
 
 if TYPE_CHECKING:
     from viewer.state.app import App
@@ -39,8 +39,7 @@ class PasteRing:
     def at(cls, app: App, pane: int, goal: SurfacePoint, radius: float) -> PasteRing:
         """On a pane's face."""
         middle = surface_places(app, pane, [goal.triangle], [goal.weights])[0]
-        x, y, z = (float(value) for value in middle)
-        normal = normal_at(app, pane, Hit(goal.triangle, goal.weights, 0, (x, y, z)))
+        normal = app.picker(pane).normal(goal.triangle)
         above = np.asarray(app.surface(pane).framing.axes[1])
         up = above - (above @ normal) * normal
         up /= max(float(np.linalg.norm(up)), 1e-9)

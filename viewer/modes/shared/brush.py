@@ -64,11 +64,10 @@ def stroke(picker: Picker, last: Pointer | None, event: Pointer, spacing: float)
         return [event.hit]
     gap = float(np.linalg.norm(np.subtract(event.hit.position, last.hit.position)))
     count = int(np.clip(np.ceil(gap / max(spacing, 1e-9)), 1, _MOST_TOUCHES))
-    hits = []
+    if count == 1:
+        return [event.hit]
     start, end = np.asarray(last.direction), np.asarray(event.direction)
-    for share in np.arange(1, count) / count:
-        direction = (1 - share) * start + share * end
-        hit = picker.along(event.origin, direction / np.linalg.norm(direction))
-        if hit is not None:
-            hits.append(hit)
-    return [*hits, event.hit]
+    shares = (np.arange(1, count) / count)[:, None]
+    directions = (1 - shares) * start + shares * end
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    return [*picker.along_all(event.origin, directions), event.hit]

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from viewer.picking import pixels_from_ray
-from viewer.state.events import Hit, Pointer
+from viewer.state.events import Pointer
 
 if TYPE_CHECKING:
     from viewer.state.app import App
 
-__all__ = ["normal_at", "on_plane", "pointed_at", "shows_result", "surface_places"]
+__all__ = ["on_plane", "pointed_at", "shows_result", "surface_places"]
 
 Array = NDArray[np.float64]
 
@@ -55,12 +55,3 @@ def surface_places(app: App, pane: int, triangles: ArrayLike, weights: ArrayLike
     surface = app.surface(pane)
     corners = surface.vertices[surface.triangles[np.asarray(triangles, dtype=np.int64)]]
     return np.einsum("nk,nkd->nd", np.asarray(weights, dtype=np.float64), corners.astype(np.float64))
-
-
-def normal_at(app: App, pane: int, hit: Hit) -> Array:
-    """The face's unit normal at a hit, evened out over the triangles around."""
-    surface = app.surface(pane)
-    around = np.isin(surface.triangles, surface.triangles[hit.triangle]).any(axis=1)
-    a, b, c = (surface.vertices[surface.triangles[around, k]].astype(np.float64) for k in range(3))
-    normal = np.cross(b - a, c - a).sum(axis=0)
-    return np.asarray(normal / max(float(np.linalg.norm(normal)), 1e-300))
