@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +13,11 @@ from numpy.typing import NDArray
 from toolkit.detail_edit import DetailChange, DetailEdit, DetailTake
 from toolkit.detail_edit import to_data as detail_data
 from toolkit.editing.applied import applied
+from toolkit.editing.drafts import Draft, plain_data
 from toolkit.editing.moved import moved_by
 from toolkit.editing.opening import open_take
 from toolkit.editing.stack import EditStack, Layer, State
+from toolkit.editing.words import step_in_words
 from toolkit.errors import InputError
 from toolkit.pose_edit import Constraint, EditParameters, PoseEdit, Residual
 from toolkit.pose_edit import to_data as pose_data
@@ -29,19 +30,6 @@ from toolkit.stages.inputs import load_sequence
 __all__ = ["EditSession"]
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class _Draft:
-    """An edit that is tried: its ``kind`` and ``data`` for the journal, and the ``state`` that it makes.
-
-    ``instead_of`` is the number of the committed edit that it would change.
-    """
-
-    kind: str
-    data: dict[str, Any]
-    state: State
-    instead_of: int | None = None
 
 
 class EditSession:
@@ -59,7 +47,7 @@ class EditSession:
         self._sequence = load_sequence(shot)
         self.fps = float(self._sequence.fps or 30.0)
         self.rest: Array = np.array(shot.array("register", "target_vertices"))
-        self._draft: _Draft | None = None
+        self._draft: Draft | None = None
         self._moved: tuple[State, Array] | None = None
         self._refresh(progress)
 
@@ -67,7 +55,7 @@ class EditSession:
     def open(cls, shot: Shot, progress: Progress = silent) -> EditSession:
         """Open a shot whose stages up to "transfer" are up to date; InputError says so where they are not.
 
-        Takes a few seconds: the transfer's matrix is factorised again, and the journal's edits are solved. An edit that
+        Takes a few seconds: the matrix of edits is factorised, and those of the journal are solved. An edit that
         cannot be applied is left out with a warning; `problem` tells why.
         """
         opened = open_take(shot, progress)
@@ -128,13 +116,13 @@ class EditSession:
     def can_undo(self) -> str | None:
         """What undo would take back, in words for a button; None if there is nothing."""
         with self._lock:
-            return _in_words(self._replay.undo, self._kinds)
+            return step_in_words(self._replay.undo, self._kinds)
 
     @property
     def can_redo(self) -> str | None:
         """What redo would do again."""
         with self._lock:
-            return _in_words(self._replay.redo, self._kinds)
+            return step_in_words(self._replay.redo, self._kinds)
 
     @property
     def state(self) -> State:
@@ -175,10 +163,10 @@ class EditSession:
         """
         parameters = parameters or EditParameters()
         with self._lock:
-            data = _plain(pose_data(constraints, parameters))
+            data = plain_data(pose_data(constraints, parameters))
             base = self._without(instead_of)
             solved = self._stack.solve_pose(base, constraints, parameters, warm=warm, progress=progress)
-            self._draft = _Draft("pose", data, self._stack.after_pose(base, solved), instead_of)
+            self._draft = Draft("pose", data, self._stack.after_pose(base, solved), instead_of)
             return solved
 
     def draft_detail(self, edit: DetailEdit, *, instead_of: int | None = None) -> DetailChange:
@@ -187,7 +175,7 @@ class EditSession:
             base = self._without(instead_of)
             change = self._stack.solve_detail(base, edit)
             state = self._stack.after_detail(base, change)
-            self._draft = _Draft("detail", _plain(detail_data(edit)), state, instead_of)
+            self._draft = Draft("detail", plain_data(detail_data(edit)), state, instead_of)
             return change
 
     @property
@@ -223,7 +211,7 @@ class EditSession:
     def add(self, kind: str, data: dict[str, Any], progress: Progress = silent) -> Edit:
         """Commit an edit given as data, as the journal holds it: ``kind`` "pose" or "detail"; drops the draft."""
         with self._lock:
-            data = _plain(data)
+            data = plain_data(data)
             self._stack.layers([*self._replay.active, Edit(-1, kind, data)], progress, strict=True)
             edit = self._journal.add(kind, data)
             self._refresh()
@@ -232,7 +220,7 @@ class EditSession:
     def change(self, number: int, data: dict[str, Any], progress: Progress = silent) -> None:
         """Give an edit new data; those after it are solved again on top of it. Drops the draft."""
         with self._lock:
-            data = _plain(data)
+            data = plain_data(data)
             edits = [replace(edit, data=data) if edit.number == number else edit for edit in self._replay.edits]
             changed = [edit for edit in edits if edit.number == number]
             if changed:  # else the journal says what is wrong
@@ -335,27 +323,3 @@ class EditSession:
     def _check_frame(self, t: int) -> None:
         if not 0 <= t < self.n_frames:
             raise InputError(f"there is no frame {t}", remedy=f"frames go from 0 to {self.n_frames - 1}")
-
-
-def _in_words(step: Step | None, kinds: dict[int, str]) -> str | None:
-    if step is None:
-        return None
-    what = f"{step.kind or kinds.get(step.edit, '')} edit {step.edit}".strip()
-    if step.name == "switch":
-        return f"switch {'on' if step.on else 'off'} {what}"
-    return f"{step.name} {what}"
-
-
-def _plain(data: Any) -> dict[str, Any]:
-    """Data as it comes back from JSON, so that a draft and its journal line are one and the same."""
-
-    def default(value: Any) -> Any:
-        if isinstance(value, np.generic | np.ndarray):
-            return value.tolist()
-        raise TypeError(f"{type(value).__name__} cannot be written")
-
-    try:
-        plain: dict[str, Any] = json.loads(json.dumps(data, default=default, allow_nan=False))
-    except (TypeError, ValueError) as error:
-        raise InputError(f"the edit cannot be written as JSON ({error})") from error
-    return plain

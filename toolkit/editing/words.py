@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from toolkit.shot.journal import Edit
+from toolkit.shot.journal import Edit, Step
 
-__all__ = ["describe"]
+__all__ = ["describe", "step_in_words"]
 
 
 def describe(edit: Edit) -> str:
@@ -20,6 +20,16 @@ def describe(edit: Edit) -> str:
         words = f"{edit.kind} edit that cannot be read"
     note = edit.data.get("note")
     return f"{words} ({note})" if note else words
+
+
+def step_in_words(step: Step | None, kinds: Mapping[int, str]) -> str | None:
+    """Such as ``switch off pose edit 2``; ``kinds`` are those of the edits by number."""
+    if step is None:
+        return None
+    what = f"{step.kind or kinds.get(step.edit, '')} edit {step.edit}".strip()
+    if step.name == "switch":
+        return f"switch {'on' if step.on else 'off'} {what}"
+    return f"{step.name} {what}"
 
 
 def _pose(data: Mapping[str, Any]) -> str:
