@@ -22,7 +22,7 @@ from toolkit.mesh.geometry import local_frames, vertex_normals
 from toolkit.mesh.topology import connected_components, unique_edges, vertex_adjacency
 from toolkit.meshio.sequence import FrameSequence
 from toolkit.operators import uniform_laplacian
-from toolkit.smoothing import SmoothingFilter, SmoothingParameters
+from toolkit.smoothing import SmoothingFilter, SmoothingParameters, smoothing_filter
 from toolkit.solve import factorise
 from toolkit.stabilisation import HeadMotion
 
@@ -66,7 +66,7 @@ class Decomposer:
     ) -> None:
         self.mesh = mesh
         resolved = (parameters or SmoothingParameters()).resolved(mesh)
-        self.filter = SmoothingFilter(mesh.triangles, mesh.n_vertices, resolved)
+        self.filter = smoothing_filter(mesh.triangles, mesh.n_vertices, resolved)
         smooth = np.asarray(self.filter.smooth(mesh.vertices), dtype=np.float64)
         if neighbour is None:
             neighbour = frame_neighbours(smooth, mesh.triangles)

@@ -112,8 +112,9 @@ class Reconstruction:
         smooth = target.rest.smooth
         self._origin = smooth.mean(axis=0)
         self._rest = (smooth - self._origin)[order].astype(np.float32)
-        moves = (bases - smooth)[:, order]  # (K, V, 3)
-        self._moves = np.ascontiguousarray(moves.reshape(len(bases), -1).T, dtype=np.float32)
+        self._moves = np.empty((smooth.size, len(bases)), dtype=np.float32)
+        for k, basis in enumerate(bases):
+            self._moves[:, k] = (basis - smooth)[order].ravel()
         self._own = target.rest.detail[order].astype(np.float32)
         self._gain = np.asarray(gain, dtype=np.float32)[order]
         self._rotations, self._translations = _placed(motion, pose, self._origin)
@@ -202,11 +203,12 @@ def local_size_ratio(source: Array, target: Array, triangles: NDArray[np.integer
     registration's noise.
     """
     average = neighbour_average(triangles, len(source))
-    areas = [vertex_areas(x, triangles) for x in (source, target)]
+    areas = np.stack([vertex_areas(x, triangles) for x in (source, target)], axis=1)
     for _ in range(_RATIO_SMOOTHING):
-        areas = [0.5 * (a + average @ a) for a in areas]
-    floor = 1e-12 * max(float(areas[0].max()), 1e-300)
-    return np.clip(np.sqrt(np.maximum(areas[1], floor) / np.maximum(areas[0], floor)), 1 / 3, 3)
+        areas = 0.5 * (areas + average @ areas)
+    floor = 1e-12 * max(float(areas[:, 0].max()), 1e-300)
+    areas = np.maximum(areas, floor)
+    return np.clip(np.sqrt(areas[:, 1] / areas[:, 0]), 1 / 3, 3)
 
 
 def _placed(motion: HeadMotion, pose: Similarity, origin: Array) -> tuple[Array, Array]:

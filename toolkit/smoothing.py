@@ -22,6 +22,7 @@ from toolkit.kernels import chebyshev_of_average
 from toolkit.mesh.core import TriangleMesh
 from toolkit.mesh.topology import boundary_edges, edge_counts, unique_edges
 from toolkit.operators import smoothing_average
+from toolkit.remembered import remembered
 
 __all__ = [
     "SmoothingFilter",
@@ -29,6 +30,7 @@ __all__ = [
     "apply_steps",
     "parameters_for_wavelength",
     "smooth_with_pymeshlab",
+    "smoothing_filter",
 ]
 
 # Where the pass band ends, as a share of the eigenvalue that 40 steps of (0.5, -0.53) halve.
@@ -148,6 +150,14 @@ class SmoothingFilter:
             scratch("smoothing", smooth),
         )
         return smooth.reshape(block.shape)
+
+
+@remembered
+def smoothing_filter(
+    triangles: NDArray[np.integer], n_vertices: int, parameters: SmoothingParameters
+) -> SmoothingFilter:
+    """The filter on this connectivity, kept: source and target share it."""
+    return SmoothingFilter(triangles, n_vertices, parameters)
 
 
 def largest_eigenvalue(triangles: NDArray[np.integer]) -> float:

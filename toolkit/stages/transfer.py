@@ -13,8 +13,11 @@ from toolkit.decomposition import Decomposer
 from toolkit.details import detail_gain
 from toolkit.feature_lines import line_edges
 from toolkit.large_scale import transfer_bases
+from toolkit.mesh import TriangleMesh
 from toolkit.progress import Progress
+from toolkit.remembered import remembered
 from toolkit.shot import Shot, StageFolder
+from toolkit.smoothing import SmoothingParameters
 from toolkit.solve import Factor, factorise
 from toolkit.stages.bases import load_pairs
 from toolkit.stages.inputs import load_lines, load_mesh
@@ -75,7 +78,13 @@ def open_system(shot: Shot) -> SavedSystem:
 def target_decomposer(shot: Shot) -> Decomposer:
     """The target's smoothing and local frames, with the source's strength and frame neighbours."""
     strength = shot.config.smoothing.resolved(load_mesh(shot, "source"))
-    return Decomposer(load_target(shot), strength, np.array(shot.array("decompose", "neighbour")))
+    return _decomposed(load_target(shot), strength, np.array(shot.array("decompose", "neighbour")))
+
+
+@remembered
+def _decomposed(mesh: TriangleMesh, parameters: SmoothingParameters, neighbour: np.ndarray) -> Decomposer:
+    """Kept, since the stage "result" and the edits begin with it, too."""
+    return Decomposer(mesh, parameters, neighbour)
 
 
 def _shapes(shot: Shot) -> np.ndarray:
