@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import shutil
 import tempfile
@@ -16,6 +17,9 @@ from toolkit.errors import InputError
 from toolkit.progress import Progress, silent
 
 __all__ = ["PerformerPaths", "SamplePaths", "TargetPaths", "build_samples", "ensure_samples"]
+
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -90,15 +94,14 @@ def ensure_samples(
     cache = Path(cache_dir) if cache_dir is not None else default_cache()
     root = cache / f"level{level}-{fingerprint()}"
     paths = build_samples(root, progress, targets, level, cache)
-    _prune(cache, f"level{level}-*", root)
+    _tell_of_older(cache, f"level{level}-*", root)
     return paths
 
 
-def _prune(cache: Path, pattern: str, current: Path) -> None:
-    """Remove what an older version of the code built, but for the last one: another process may be reading it."""
-    older = sorted((path for path in cache.glob(pattern) if path != current), key=lambda path: path.stat().st_mtime)
-    for path in older[:-1]:
-        shutil.rmtree(path, ignore_errors=True)
+def _tell_of_older(cache: Path, pattern: str, current: Path) -> None:
+    """Shots may still point to what an older version of the code built, so it is left to the user to remove."""
+    for older in sorted(path for path in cache.glob(pattern) if path != current):
+        log.info("%s is of an older version; remove it once no shot refers to it", older)
 
 
 def build_samples(

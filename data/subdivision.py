@@ -55,9 +55,10 @@ def catmull_clark(quads: NDArray[np.integer], n_vertices: int, levels: int) -> S
 
 
 def _one_round(quads: Index, n: int) -> tuple[sp.csr_matrix, Index, Index]:
-    sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2)
-    edges, side_edge, uses = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
-    side_edge = side_edge.reshape(-1, 4)
+    ends = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2), axis=2)
+    # One number for each edge: rows of numbers take much longer to sort.
+    keys, side_edge, uses = np.unique(ends[..., 0] * n + ends[..., 1], return_inverse=True, return_counts=True)
+    edges, side_edge = np.stack(np.divmod(keys, n), axis=1), side_edge.reshape(-1, 4)
     n_faces, n_edges = len(quads), len(edges)
 
     face_point = _rows(np.repeat(np.arange(n_faces), 4), quads.ravel(), 0.25, (n_faces, n))

@@ -76,6 +76,17 @@ def test_unknown_names_and_levels_are_refused(tmp_path, capsys):
     assert "elf" in capsys.readouterr().err
 
 
+def test_what_an_older_version_built_stays(tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr("data.samples.build_samples", lambda root, *_: root.mkdir())
+    older = [tmp_path / f"level0-{name}" for name in ("000000000000", "111111111111")]
+    for folder in older:
+        (folder / "performer").mkdir(parents=True)
+    with caplog.at_level("INFO"):
+        ensure_samples(tmp_path, level=0)
+    assert all((folder / "performer").is_dir() for folder in older)
+    assert all(str(folder) in caplog.text for folder in older)
+
+
 def test_a_wrong_or_missing_wheel_is_named(tmp_path, monkeypatch):
     wheel = tmp_path / "wrong.whl"
     wheel.write_bytes(b"not the wheel")

@@ -142,7 +142,8 @@ def test_the_sources_stay_as_they_are(inputs: dict[str, Path], tmp_path: Path) -
     assert len([p for p in inputs["source"].parent.rglob("*") if p.is_file()]) == len(files)
 
 
-def test_ctrl_c_is_clean(inputs: dict[str, Path], tmp_path: Path) -> None:
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_being_stopped_is_clean(inputs: dict[str, Path], tmp_path: Path, how: signal.Signals) -> None:
     shot = tmp_path / "shot"
     new_shot(shot, inputs)
     command = [sys.executable, str(ROOT / "scripts" / "run_all.py"), str(shot)]
@@ -150,10 +151,11 @@ def test_ctrl_c_is_clean(inputs: dict[str, Path], tmp_path: Path) -> None:
     deadline = time.monotonic() + 60
     while not list(shot.glob("stages/*")) and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
-    os.kill(process.pid, signal.SIGINT)
+    os.kill(process.pid, how)
     _, said = process.communicate(timeout=60)
     if process.returncode != 0:  # it may just have finished
         assert process.returncode == 130
         assert "Traceback" not in said
+        assert not list(shot.rglob(".*.part*"))
     assert script("run_all", shot).returncode == 0
     assert read_mesh(inputs["target"]).n_vertices == np.load(shot / "result" / "frames.npy").shape[1]
