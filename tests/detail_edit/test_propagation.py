@@ -110,5 +110,9 @@ def test_an_edit_goes_the_papers_way_if_asked(take: DetailTake) -> None:
     gained = np.linalg.norm((after - before)[:, region.vertices], axis=(1, 2))
     asked = np.linalg.norm(before[KEY, region.vertices])
     assert 0.7 < gained[KEY] / asked < 1
+    ids = region.vertices
+    jolts = [np.abs(np.diff(values[:, ids], n=2, axis=0)).max(axis=(1, 2)) for values in (before, after)]
+    for end in (first - 1, last + 1):
+        assert jolts[1][end - 2 : end + 1].max() < jolts[0].max()
     # The flicker that "follow" is there to avoid: a quarter of the window on, next to nothing is left.
     assert gained[(KEY + last) // 2] < 0.1 * gained[KEY]
