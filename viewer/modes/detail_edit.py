@@ -12,19 +12,17 @@ from numpy.typing import NDArray
 from toolkit.detail_edit import DetailChange, SurfacePoint, painted
 from toolkit.detail_edit.window import gain_curve
 from toolkit.editing import EditSession
-from toolkit.errors import InputError
 from toolkit.progress import Progress
 from viewer.modes.base import Tint
 from viewer.modes.detail.draft import DetailDraft
 from viewer.modes.detail.handles import PasteRing
 from viewer.modes.detail.marks import detail_marks, detail_tint
-from viewer.modes.detail.panel import KEYS, TOOLS, detail_rows, hint, tool_of, used
+from viewer.modes.detail.panel import KEYS, detail_rows, hint, tool_of, used
 from viewer.modes.detail.steps import DetailSteps
-from viewer.modes.shared.brush import Brush
 from viewer.modes.shared.ground import Grounds
 from viewer.modes.shared.pointing import pointed_at, shows_result, surface_places
 from viewer.picking import Picker
-from viewer.state.events import Hit, Key, Pointer
+from viewer.state.events import Key, Pointer
 from viewer.state.gestures import CLICK
 from viewer.state.marks import Mark
 from viewer.state.rows import Row
@@ -37,7 +35,6 @@ __all__ = ["DetailEditMode"]
 Array = NDArray[np.float64]
 
 _GRIP = 10.0  # pixels round a point or a knob that take hold of it
-_TOOL_KEYS = {"b": "paint", "c": "line", "p": "place", "n": "goal"}
 
 
 class DetailEditMode(DetailSteps):
@@ -45,15 +42,15 @@ class DetailEditMode(DetailSteps):
 
     name = kind = "detail"
     title = "Detail edit"
+    tools = (("paint", "Brush"), ("line", "Line"), ("place", "Place"), ("goal", "New line"))
+    tool_keys = {"b": "paint", "c": "line", "p": "place", "n": "goal"}  # noqa: RUF012  (the class's, and never changed)
+    brush_tool = "paint"
+    hovering = frozenset({"paint", "line", "goal"})
 
     def __init__(self, app: App, grounds: Grounds) -> None:
         super().__init__(app, grounds)
-        self.tool = "paint"
-        self.brush = Brush()
-        self.under: tuple[int, Hit] | None = None
         self.change: DetailChange | None = None
         self.show_region = True
-        self.settings = False
         self.stroke_places: list[Array] = []
         self._stroke: list[SurfacePoint] = []
         self._gesture = ""
@@ -68,11 +65,6 @@ class DetailEditMode(DetailSteps):
     def draft_from(self, data: Mapping[str, Any], number: int | None = None) -> DetailDraft:
         """Of the journal or of the file of drafts."""
         return DetailDraft.from_data(data, number)
-
-    def enter(self) -> None:
-        """The tool is as it was."""
-        self.choose_tool(self.tool)
-        super().enter()
 
     def leave(self) -> None:
         """The open edit is on disk already; only a gesture that was not let go is given up."""
@@ -92,21 +84,21 @@ class DetailEditMode(DetailSteps):
 
     # -- what is shown --------------------------------------------------------------------------------------------
 
-    def hint(self) -> str:
+    def tool_hint(self) -> str:
         """By tool."""
         return hint(self)
 
-    def rows(self) -> Sequence[Row]:
+    def edit_rows(self) -> Sequence[Row]:
         """What to do, the region, the edit's own values, when, commit."""
         return detail_rows(self)
 
-    def marks(self, pane: int) -> Sequence[Mark]:
+    def edit_marks(self, pane: int) -> Sequence[Mark]:
         """Lines, the copy's ring, the brush."""
-        return detail_marks(self, pane) if shows_result(self.app, pane) else ()
+        return detail_marks(self, pane)
 
-    def tint(self, pane: int) -> Tint | None:
+    def edit_tint(self, pane: int) -> Tint | None:
         """The region."""
-        return detail_tint(self, pane) if shows_result(self.app, pane) else None
+        return detail_tint(self, pane)
 
     def keys(self) -> Sequence[tuple[str, str]]:
         """For the help."""
@@ -185,61 +177,39 @@ class DetailEditMode(DetailSteps):
         else:
             self.done_with(before)
 
-    def hover(self, event: Pointer) -> None:
-        """The brush's ring follows."""
-        seen = event.hit is not None and shows_result(self.app, event.pane)
-        self.under = (event.pane, event.hit) if seen and event.hit is not None else None
-        self.app.touch("overlay")
-
-    def wheel(self, event: Pointer) -> bool:
-        """With ctrl: the brush's size."""
-        if self.tool != "paint" or "ctrl" not in event.modifiers:
-            return False
-        self.brush.turned(event.wheel)
-        self.app.touch("overlay", "panel")
-        return True
-
-    def key(self, event: Key) -> bool:
-        """Tools, commit, cancel."""
-        if event.name in _TOOL_KEYS:
-            self.choose_tool(_TOOL_KEYS[event.name])
-        elif event.name == "enter":
-            self.commit()
-        elif event.name == "escape":
-            return self._escape()
-        elif event.name in ("[", "]"):
-            self.brush.turned(-1 if event.name == "[" else 1)
-        elif event.name == "h":
+    def edit_key(self, event: Key) -> bool:
+        """Hide the region, take a point of the line away."""
+        if event.name == "h":
             self.show_region = not self.show_region
             self.app.touch("faces")
         elif event.name in ("delete", "backspace"):
             self.drop_point(self.tool)
         else:
             return False
-        self.app.touch("panel", "overlay", "status")
         return True
 
-    def panel(self, name: str, value: Any, final: bool) -> None:
-        """A row was used, or the window on the time line."""
-        if name == "window":
-            if self.draft is not None:
-                window = value if value is not None else (0, self.app.play.n_frames - 1)
-                self.set_window(replace(self.draft, window=window), final)
-        elif name.startswith("tool:"):
-            self.choose_tool(name[5:])
-        else:
-            used(self, name, value, final)
+    def row_used(self, name: str, value: Any, final: bool) -> None:
+        """A row of the panel."""
+        used(self, name, value, final)
 
-    def choose_tool(self, tool: str) -> None:
-        """Another tool; the action that needs it comes with it."""
-        if tool not in dict(TOOLS):
-            raise InputError(f"there is no tool {tool!r}", remedy=f"tools are {', '.join(dict(TOOLS))}")
+    def window_moved(self, window: tuple[int, int] | None, final: bool) -> None:
+        """The edit acts in it."""
+        if self.draft is not None:
+            self.set_window(replace(self.draft, window=window or (0, self.app.play.n_frames - 1)), final)
+
+    def usable(self, tool: str) -> str:
+        """Some tools are for one action only."""
         needs = {"place": "paste", "goal": "reshape"}.get(tool)
-        if needs is not None and self.current.action != needs:
-            tool = "paint"
-        self.tool, self.under = tool, None
-        self.hovers = tool != "place"
-        self.app.touch("overlay", "panel", "status")
+        return tool if needs in (None, self.current.action) else "paint"
+
+    def give_up_gesture(self) -> bool:
+        """What was painted or drawn since the press."""
+        if not self._gesture:
+            return False
+        self.draft = self._before
+        self._drop_gesture()
+        self.solve()
+        return True
 
     def choose_action(self, action: str) -> None:
         """Another thing to do with the region."""
@@ -312,20 +282,6 @@ class DetailEditMode(DetailSteps):
         self._gesture, self._stroke, self.stroke_places = "", [], []
         self._before, self.picker, self._last = None, None, None
         self.app.touch("overlay")
-
-    def _escape(self) -> bool:
-        if self.app.worker.progress is not None:
-            return False  # that is cancelled first
-        if self._gesture:
-            self.draft = self._before
-            self._drop_gesture()
-            self.solve()
-        elif self.draft is not None:
-            self.cancel()
-        else:
-            return False
-        self.app.touch("overlay", "panel", "status", "faces")
-        return True
 
     # -- solving --------------------------------------------------------------------------------------------------
 

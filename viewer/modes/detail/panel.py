@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewer.modes.detail.draft import ACTIONS, DetailDraft
-from viewer.modes.shared.brush import LARGEST, SMALLEST
 from viewer.state.rows import Button, Buttons, Check, Choice, Entry, Heading, Items, Note, Number, Row, Slider
 
 if TYPE_CHECKING:
     from viewer.modes.detail_edit import DetailEditMode
 
-__all__ = ["KEYS", "TOOLS", "detail_rows", "hint", "tool_of", "used"]
+__all__ = ["KEYS", "detail_rows", "hint", "tool_of", "used"]
 
-TOOLS = (("paint", "Brush"), ("line", "Line"), ("place", "Place"), ("goal", "New line"))
 KEYS = (
     ("b, c, p, n", "brush, line, place the copy, new line"),
     ("[, ], ctrl-wheel", "brush size"),
@@ -23,7 +21,6 @@ KEYS = (
     ("delete", "take the last point of the line away"),
     ("enter, esc", "commit the edit, give it up"),
 )
-_OF_ACTION = {"paste": "place", "reshape": "goal"}
 _NUMBERS: dict[str, tuple[float, float]] = {
     "factor": (-10.0, 10.0),
     "rotation": (-180.0, 180.0),
@@ -38,8 +35,6 @@ _FLAGS = ("mirror", "hold", "add", "everywhere")
 
 def hint(mode: DetailEditMode) -> str:
     """What a click will do now."""
-    if mode.app.editing.session is None:
-        return "the shot has to be open for edits"
     if mode.tool == "paint":
         return "drag over the wrinkle to paint, shift erases; ctrl-wheel sizes the brush"
     if mode.tool == "place":
@@ -50,33 +45,12 @@ def hint(mode: DetailEditMode) -> str:
 
 def detail_rows(mode: DetailEditMode) -> list[Row]:
     """All rows."""
-    editing = mode.app.editing
-    if editing.session is None:
-        if editing.problem:
-            return [Note(editing.problem, "bad")]
-        words = "opening the shot for edits ..." if editing.opening else "Run all steps first; then edits can be made."
-        return [Note(words, "quiet")]
     if mode.grounds.ground is None:
         return [Note("preparing to paint ...", "quiet")]
     draft = mode.current
-    tools = [tool for tool in TOOLS if tool[0] in ("paint", "line") or tool[0] == _OF_ACTION.get(draft.action)]
-    rows: list[Row] = [
-        Choice("action", "do", ACTIONS, draft.action),
-        Buttons(tuple(Button(f"tool:{name}", words, on=name == mode.tool) for name, words in tools)),
-    ]
-    possible = mode.draft is not None and not mode.committing
-    rows.append(
-        Buttons(
-            (
-                Button("commit", "Commit (Enter)", possible and not draft.empty),
-                Button("drop", "Cancel (Esc)", possible),
-            )
-        )
-    )
+    rows: list[Row] = [Choice("action", "do", ACTIONS, draft.action), mode.tool_row(), *mode.commit_rows()]
     if mode.draft is not None and draft.missing:
         rows.append(Note(f"Next: {draft.missing}.", "plain"))
-    if draft.instead_of is not None:
-        rows.append(Note(f"changes edit {draft.instead_of}", "quiet"))
     rows += _region_rows(mode, draft)
     rows += {"scale": _scale_rows, "paste": _paste_rows, "reshape": _reshape_rows, "gain": _gain_rows}[draft.action](
         mode, draft
@@ -89,8 +63,6 @@ def detail_rows(mode: DetailEditMode) -> list[Row]:
 def used(mode: DetailEditMode, name: str, value: Any, final: bool) -> None:
     """A row was used."""
     actions = {
-        "commit": mode.commit,
-        "drop": mode.cancel,
         "grow": lambda: mode.resize(1),
         "shrink": lambda: mode.resize(-1),
         "mirror_region": mode.mirror_region,
@@ -103,15 +75,11 @@ def used(mode: DetailEditMode, name: str, value: Any, final: bool) -> None:
     }
     if name in actions:
         actions[name]()
-    elif name == "brush":
-        mode.brush.radius = float(np.clip(float(value) / 100, SMALLEST, LARGEST))
     elif name == "hardness":
         mode.brush.hardness = float(np.clip(value, 0, 1))
     elif name == "show_region":
         mode.show_region = bool(value)
         mode.app.touch("faces")
-    elif name == "settings":
-        mode.settings = bool(value)
     elif name == "region_name":
         mode.region_name = str(value)
     elif name == "load_region":
@@ -152,7 +120,7 @@ def _region_rows(mode: DetailEditMode, draft: DetailDraft) -> list[Row]:
     words = f"{count:,} vertices" if count else "nothing selected yet"
     rows: list[Row] = [Heading("Region"), Note(words, "quiet")]
     if mode.tool == "paint":
-        rows.append(Slider("brush", "brush, % of the face", 100 * mode.brush.radius, 100 * SMALLEST, 100 * LARGEST))
+        rows.append(mode.brush_row())
         rows.append(Slider("hardness", "hardness", mode.brush.hardness, 0.0, 1.0))
     elif mode.tool == "line" and draft.curve is not None:
         rows.append(Slider("width", "reach, % of the face", 100 * draft.width, 0.2, 15.0))
@@ -241,7 +209,7 @@ def _time_rows(mode: DetailEditMode, draft: DetailDraft) -> list[Row]:
             rows.append(Slider("threshold", "as long as it has, times", draft.threshold, 0.05, 0.9))
         else:
             rows.append(Note("drag the window's ends on the time line", "quiet"))
-    rows.append(Check("settings", "more settings", mode.settings))
+    rows.append(mode.settings_row())
     if mode.settings:
         rows.append(Number("band", "smoothing band, edges", draft.band, 0.0, 50.0))
         if draft.action != "gain":

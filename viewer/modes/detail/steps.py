@@ -12,7 +12,7 @@ from toolkit.errors import InputError
 from viewer.modes.detail import drawing
 from viewer.modes.detail.draft import DetailDraft
 from viewer.modes.shared.ground import Ground, Grounds
-from viewer.modes.shared.open_edit import OpenEdit
+from viewer.modes.shared.tools import ToolEdit
 
 if TYPE_CHECKING:
     from viewer.state.app import App
@@ -23,7 +23,7 @@ _STEP = 1.5  # edges that a region grows or shrinks by at once
 _STROKE_POINTS = 8
 
 
-class DetailSteps(OpenEdit[DetailDraft]):
+class DetailSteps(ToolEdit[DetailDraft]):
     """Changes of the draft; ``template`` is what the next one begins with."""
 
     def __init__(self, app: App, grounds: Grounds) -> None:

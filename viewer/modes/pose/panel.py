@@ -9,8 +9,7 @@ import numpy as np
 
 from toolkit.pose_edit import DistanceConstraint, PointConstraint
 from viewer.modes.pose.draft import Handle, PoseDraft
-from viewer.modes.shared.brush import LARGEST, SMALLEST
-from viewer.state.rows import Button, Buttons, Check, Choice, Entry, Heading, Items, Note, Number, Row, Slider
+from viewer.state.rows import Button, Check, Choice, Entry, Heading, Items, Note, Number, Row, Slider
 
 if TYPE_CHECKING:
     from viewer.modes.pose_edit import PoseEdit
@@ -35,8 +34,6 @@ _LIST_ROWS = 6
 
 def hint(mode: PoseEdit) -> str:
     """What a click will do now."""
-    if mode.app.editing.session is None:
-        return "the shot has to be open for edits"
     if mode.tool == "distance":
         return "click the second point of the pair" if mode.pending is not None else "click two points of the target"
     if mode.tool == "fix":
@@ -46,29 +43,8 @@ def hint(mode: PoseEdit) -> str:
 
 def pose_rows(mode: PoseEdit) -> list[Row]:
     """All rows."""
-    from viewer.modes.pose_edit import TOOLS
-
-    editing = mode.app.editing
-    if editing.session is None:
-        if editing.problem:
-            return [Note(editing.problem, "bad")]
-        words = "opening the shot for edits ..." if editing.opening else "Run all steps first; then edits can be made."
-        return [Note(words, "quiet")]
     draft = mode.draft or PoseDraft()
-    rows: list[Row] = [
-        Buttons(tuple(Button(f"tool:{name}", words, on=name == mode.tool) for name, words in TOOLS)),
-    ]
-    possible = mode.draft is not None and not mode.committing
-    rows.append(
-        Buttons(
-            (
-                Button("commit", "Commit (Enter)", possible and not draft.empty),
-                Button("drop", "Cancel (Esc)", possible),
-            )
-        )
-    )
-    if draft.instead_of is not None:
-        rows.append(Note(f"changes edit {draft.instead_of}", "quiet"))
+    rows: list[Row] = [mode.tool_row(), *mode.commit_rows()]
     lines = tuple(_words(mode, index, handle) for index, handle in enumerate(draft.handles))
     rows.append(Items("handle", lines, mode.selected, _LIST_ROWS))
     if 0 <= mode.selected < len(draft.handles):
@@ -81,18 +57,10 @@ def pose_rows(mode: PoseEdit) -> list[Row]:
 
 def used(mode: PoseEdit, name: str, value: Any, final: bool) -> None:
     """A row was used."""
-    if name == "commit":
-        mode.commit()
-    elif name == "drop":
-        mode.cancel()
-    elif name == "delete":
+    if name == "delete":
         mode.delete()
     elif name == "handle":
         mode.select(int(value))
-    elif name == "brush":
-        mode.brush.radius = float(np.clip(float(value) / 100, SMALLEST, LARGEST))
-    elif name == "settings":
-        mode.settings = bool(value)
     else:
         _change_draft(mode, name, value, final)
 
@@ -154,7 +122,7 @@ def _selected_rows(mode: PoseEdit, chosen: Handle) -> list[Row]:
 def _held_rows(mode: PoseEdit, draft: PoseDraft) -> list[Row]:
     rows: list[Row] = [Heading("Held still")]
     if mode.tool == "fix":
-        rows.append(Slider("brush", "brush, % of the face", 100 * mode.brush.radius, 100 * SMALLEST, 100 * LARGEST))
+        rows.append(mode.brush_row())
     words = f"{len(draft.fixed):,} vertices painted" if draft.fixed else "nothing painted"
     if draft.fixed:
         words += _held_residual(mode, draft)
@@ -182,7 +150,7 @@ def _spread_rows(mode: PoseEdit, draft: PoseDraft) -> list[Row]:
     ]
     if outside and parameters.mode == "weights":
         rows.append(Note(f"frame {outside[0]} lies outside the window", "bad"))
-    rows.append(Check("settings", "more settings", mode.settings))
+    rows.append(mode.settings_row())
     if mode.settings:
         rows += [
             Number("lambda_b", "keep expressions (lambda b)", parameters.lambda_b, 1e-6, 1e6),
