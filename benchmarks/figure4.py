@@ -2,8 +2,8 @@
 """The paper's Figure 4 on a sample face: how far an edit reaches with the bases, the weights, or both free to change.
 
 One corner of the mouth is pulled in one frame. The columns are that frame, and the frame outside the edit's window
-whose expression is most like it. With the bases alone the edit reaches the other frame too; with the weights alone it
-stays in the window; with both it does some of each. Colours show how far the surface moved.
+whose expression, by its weights, is most like it. With the bases alone the edit reaches the other frame too; with the
+weights alone it stays in the window; with both it does some of each. Colours show how far the surface moved.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def figure(
 ) -> tuple[np.ndarray, dict[str, tuple[float, float]]]:
     """The sheet, and how far each way moves the two frames at most."""
     vertex = views.landmarks[landmark]
-    key, twin = similar_frames(session, views)
+    key, twin = similar_frames(session, vertex)
     window = (max(key - _WINDOW, 0), min(key + _WINDOW, session.n_frames - 1))
     # Up and out, as half a smile.
     across = np.cross(views.target.up, views.target.forward)
@@ -89,20 +89,16 @@ def figure(
     return add_legend(contact_sheet(rows, columns), scale), numbers
 
 
-def similar_frames(session: EditSession, views: ShotViews) -> tuple[int, int]:
-    """Two frames of one expression, farther apart than the window: both are far from rest, and look alike."""
-    ids = np.array(list(views.landmarks.values()))
-    motion = views.motions[1]
-    seen = np.stack([session.unedited_frame(t)[ids] for t in range(session.n_frames)])
-    still = np.einsum("tvi,tij->tvj", seen - motion.translations[:, None], motion.rotations) - session.rest[ids]
-    flat = still.reshape(session.n_frames, -1)
-    size = np.linalg.norm(flat, axis=1)
-    apart = np.linalg.norm(flat[:, None] - flat, axis=2)
-    score = np.minimum.outer(size, size) - 2 * apart
-    t = np.arange(session.n_frames)
-    score[np.abs(t[:, None] - t) <= _WINDOW + 2] = -np.inf
-    score[(t < _WINDOW) | (t >= session.n_frames - _WINDOW)] = -np.inf
-    key, twin = np.unravel_index(int(score.argmax()), score.shape)
+def similar_frames(session: EditSession, vertex: int) -> tuple[int, int]:
+    """Two frames of the most alike weights, farther apart than the window; in the first the vertex is far from rest."""
+    weights, t = session.weights, np.arange(session.n_frames)
+    moves = session.unedited_state.take.moves_at([vertex])[:, 0]
+    moved = np.linalg.norm(weights @ moves, axis=1)
+    apart = np.linalg.norm(weights[:, None] - weights, axis=2)
+    unlike = apart / np.maximum(np.linalg.norm(weights, axis=1), 1e-9)[:, None]
+    unlike[np.abs(t[:, None] - t) <= _WINDOW + 2] = np.inf
+    unlike[(t < _WINDOW) | (t >= session.n_frames - _WINDOW) | (moved < 0.3 * moved.max())] = np.inf
+    key, twin = np.unravel_index(int(unlike.argmin()), unlike.shape)
     return int(key), int(twin)
 
 
