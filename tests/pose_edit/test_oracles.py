@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from toolkit.contacts import ContactPairs
 from toolkit.mesh import TriangleMesh
 from toolkit.pose_edit import (
     DistanceConstraint,
@@ -14,6 +17,7 @@ from toolkit.pose_edit import (
     FixedConstraint,
     PointConstraint,
     PoseEditor,
+    TouchingPairs,
 )
 from toolkit.pose_edit.constraints import rows_of
 
@@ -27,6 +31,8 @@ class Joint:
         self.n = last - self.first + 1
         problem = PoseEditor(take, mesh.triangles)._problem(self.rows, parameters, (self.first, last))
         self.time, self.lambda_b, self.lambda_e = problem.weights.time, parameters.lambda_b, problem.lambda_e
+        opening = problem.weights.opening
+        self.opening = np.zeros((self.n, take.n_bases)) if opening is None else opening
         self.matrix = PoseEditor(take, mesh.triangles).matrix(parameters).toarray()
         self.picks = np.zeros((len(self.rows), take.n_vertices))
         self.picks[:, self.rows.vertices] = self.rows.combination
@@ -41,8 +47,9 @@ class Joint:
         change = unknowns[size:].reshape(self.n, take.n_bases)
         weights = take.weights.copy()
         weights[self.first : self.first + self.n] += change
-        energy = self.lambda_b * (scaled**2).sum() + (change * (self.time @ change)).sum()
-        d_change = 2 * (self.time @ change)
+        force = self.time @ change + self.opening * change
+        energy = self.lambda_b * (scaled**2).sum() + (change * force).sum()
+        d_change = 2 * force
         d_delta = np.zeros_like(delta)
         for a, frame in enumerate(rows.frames):
             at = np.einsum("v,kvc->kc", self.picks[a], take.moves + delta)
@@ -69,9 +76,15 @@ class Joint:
         return float(found.fun)
 
 
-@pytest.mark.parametrize("lambda_w", [0.05, 1.0])
-def test_reaches_the_energy_of_a_joint_bounded_solve(patch: tuple[TriangleMesh, EditableTake], lambda_w: float) -> None:
+@pytest.mark.parametrize(("lambda_w", "touching"), [(0.05, False), (1.0, False), (0.05, True)])
+def test_reaches_the_energy_of_a_joint_bounded_solve(
+    patch: tuple[TriangleMesh, EditableTake], lambda_w: float, touching: bool
+) -> None:
     mesh, take = patch
+    if touching:
+        edge, corners = np.array([[23, 24], [24, 25]]), np.array([[8, 12], [8, 12]])
+        pairs = ContactPairs(np.array([10, 11]), edge, np.array([0.5, 0.2]), np.ones(2, bool), corners)
+        take = replace(take, contacts=TouchingPairs(pairs, np.repeat(np.linspace(0, 1, 12)[:, None], 2, axis=1)))
     constraints = [
         PointConstraint(4, 9, offset=(0.1, -0.05, -0.2)),
         PointConstraint(7, 30, offset=(0.0, -0.2, 0.1), weight=2.0),
