@@ -16,7 +16,9 @@ paper's own least squares (`toolkit.detail_edit.propagation`).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +37,7 @@ __all__ = ["solve_detail_edit"]
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
+T = TypeVar("T")
 
 
 def solve_detail_edit(edit: DetailEdit, take: DetailTake, other: DetailTake | None = None) -> DetailChange:
@@ -156,7 +159,10 @@ def _source_of(edit: PasteEdit, take: DetailTake, other: DetailTake | None) -> D
 
 
 def _with_band(region: Region, band: float, take: DetailTake) -> Region:
-    return banded(take.surface, region, band * take.surface.edge(region.vertices))
+    def make() -> Region:
+        return banded(take.surface, region, band * take.surface.edge(region.vertices))
+
+    return _kept(take, region, ("band", band), make)
 
 
 def _window(edit: KeyedEdit, take: DetailTake, source: DetailTake, frame: int) -> tuple[int, int]:
@@ -164,9 +170,19 @@ def _window(edit: KeyedEdit, take: DetailTake, source: DetailTake, frame: int) -
     if edit.window is not None:
         check_window(take, edit.window, edit.frame)
         return edit.window
-    first, last = find_window(source, edit.region, frame, edit.threshold)
+
+    def find() -> tuple[int, int]:
+        return find_window(source, edit.region, frame, edit.threshold)
+
+    first, last = _kept(source, edit.region, ("window", frame, edit.threshold), find)
     shift = edit.frame - frame
     return max(first + shift, 0), min(last + shift, take.n_frames - 1)
+
+
+def _kept(take: DetailTake, region: Region, what: tuple[object, ...], make: Callable[[], T]) -> T:
+    """What stays the same while a factor is dragged or a paste turned."""
+    found: T = take.shared.get((*what, region.vertices.tobytes(), region.weights.tobytes()), make)
+    return found
 
 
 def _static_change(region: Region, scale: Array, offset: Array | None) -> DetailChange:
