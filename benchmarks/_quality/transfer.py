@@ -123,7 +123,9 @@ def transfer_section(case: Case, folder: Path, progress: Progress) -> Section:
         "the error of the motion, so that of a registered rest pose is left out. "
         "The known answer adds the same offsets in centimetres to every human head, so copying displacements is "
         "nearly right by construction; it closes no lid. The goals of contacts and of unrest are judged on the "
-        "performance with wrinkles. Trembling is what fourth differences in time have beside first ones."
+        "performance with wrinkles. Trembling is what fourth differences in time have beside first ones. Second "
+        "differences scaled by the faces' size grow with a lid that has farther to close or a longer jaw, as the known "
+        "answer's do; scaled by how fast each vertex moves on either face they don't."
     )
     return Section(f"transfer onto {case.name}", about, tuple(rows))
 
