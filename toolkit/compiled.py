@@ -7,10 +7,24 @@ from collections.abc import Callable
 from typing import Any
 
 import numba
+from numba.core.compiler import Compiler
 
-__all__ = ["njit"]
+__all__ = ["DisjointArrays", "njit"]
 
 log = logging.getLogger(__name__)
+
+
+class DisjointArrays(Compiler):
+    """Compiles for arrays that share no memory with each other, which the caller has to see to.
+
+    A loop is vectorised only where nothing that it reads can be what it has just written. Not told so, the compiler
+    compares addresses before every loop, and gives up where there are more than a few.
+    """
+
+    def define_pipelines(self) -> Any:
+        """Numba's own passes."""
+        self.state.flags.noalias = True
+        return super().define_pipelines()
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

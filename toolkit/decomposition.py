@@ -89,7 +89,8 @@ class Decomposer:
         Deltas are small, so float32 costs 1e-7 of the motion, not of the position.
         """
         stop = start + len(frames)
-        delta = np.empty((self.mesh.n_vertices, 3, len(frames)), dtype=np.float32)
+        details = np.empty((self.mesh.n_vertices, 3, len(frames)), dtype=np.float32)
+        delta = scratch("deltas", details)
         frames_to_block(
             frames,
             self.filter.order,
@@ -102,8 +103,8 @@ class Decomposer:
         points = np.add(smooth, self._smooth32[:, :, None], out=scratch("points", smooth))
         block, normals = self.block, scratch("normals", points)
         own, local = self._offset32, self._detail32
-        take_details(points, block.triangles, block.neighbour, normals, smooth, own, local, delta)
-        return smooth, delta
+        take_details(points, block.triangles, block.neighbour, normals, smooth, delta, own, local, details)
+        return smooth, details
 
 
 class BlockNumbering:

@@ -117,8 +117,7 @@ class Reconstruction:
             self._moves[:, k] = (basis - smooth)[order].ravel()
         self._own = target.rest.detail[order].astype(np.float32)
         self._gain = np.asarray(gain, dtype=np.float32)[order]
-        self._rotations, self._translations = _placed(motion, pose, self._origin)
-        self._scale = pose.scale
+        self._turns, self._translations = _placed(motion, pose, self._origin)
         self._bases_changes: tuple[BasesChange, ...] = ()
         self._changed_details: ChangedDetails | None = None
         # Responses in the blocks' numbering; while an edit is dragged they stay the same from solve to solve.
@@ -146,8 +145,8 @@ class Reconstruction:
         """Write frames ``start <= t < stop`` to ``out`` (B, V, 3), from the source's motion details (B, V, 3)."""
         points = self._large_scale(start, stop)
         shift = self._detail_shift(points, details, start, stop)
-        rotations, translations = self._rotations[start:stop], self._translations[start:stop]
-        place_frames(points, shift, self._target.filter.position, rotations, translations, self._scale, out)
+        turns, translations = self._turns[start:stop], self._translations[start:stop]
+        place_frames(points, shift, self._target.filter.position, turns, translations, out)
 
     def detail_offsets(self, frame: int, details: NDArray[np.float32]) -> NDArray[np.float32]:
         """What details add to the large-scale shape of a frame, before the head's motion, ``(V, 3)``.
@@ -211,11 +210,12 @@ def local_size_ratio(source: Array, target: Array, triangles: NDArray[np.integer
     return np.clip(np.sqrt(areas[:, 1] / areas[:, 0]), 1 / 3, 3)
 
 
-def _placed(motion: HeadMotion, pose: Similarity, origin: Array) -> tuple[Array, Array]:
-    """Rotations and translations that take centred, stabilised points to the target's own place, frame by frame."""
-    rotations = pose.rotation @ motion.rotations
+def _placed(motion: HeadMotion, pose: Similarity, origin: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Scaled rotations and translations that take centred, stabilised points to the target's own place, by frame."""
     moved = motion.rotations @ origin + motion.translations
-    return rotations, pose.scale * moved @ pose.rotation.T + pose.translation
+    turns = pose.scale * (pose.rotation @ motion.rotations)
+    translations = pose.scale * moved @ pose.rotation.T + pose.translation
+    return turns.astype(np.float32), translations.astype(np.float32)
 
 
 def detail_gain(parameters: DetailParameters, source: Array, target: Array, triangles: NDArray[np.integer]) -> Array:

@@ -2,16 +2,14 @@
 
 A block holds B frames with the frames innermost, ``(V, 3, B)``: every operator then streams over contiguous memory
 and the compiler vectorises over the frames. All of them release the interpreter lock, so blocks can run on threads.
-
-The compiler vectorises a loop only if it can rule out, with a few comparisons, that what is written is read again. So
-loops are short and write one thing each, into small work arrays that stay in the cache.
+No two arrays that are given to one function may share memory.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from toolkit.compiled import njit
+from toolkit.compiled import DisjointArrays, njit
 
 __all__ = [
     "block_frames",
@@ -27,10 +25,10 @@ __all__ = [
 
 # "contract": a product and a sum in one instruction; the order of sums stays as it is written.
 _OPTIONS = {"cache": True, "nogil": True, "fastmath": {"contract"}, "boundscheck": False, "error_model": "numpy"}
+# Not for what only copies: vectorised, it gathers numbers one by one.
+_ARITHMETIC = _OPTIONS | {"pipeline_class": DisjointArrays}
 # Vertices that are copied frame by frame together, so that whole cache lines are written.
 _TILE = 64
-# Vectors whose local frames are worked out together: enough for long loops, few enough for the first cache.
-_TOGETHER = 128
 
 
 @njit(**_OPTIONS)
@@ -73,68 +71,48 @@ def block_to_frames(block, position, out):
 
 
 @njit(**_OPTIONS)
-def place_frames(points, shift, position, rotations, translations, scale, out):
-    """Sum, put the rigid motion on and renumber: ``out[b, v] = scale R_b (points + shift)[position[v], :, b] + t_b``.
+def place_frames(points, shift, position, turns, translations, out):
+    """Sum, move and renumber: ``out[b, v] = turns_b (points + shift)[position[v], :, b] + translations_b``.
 
-    ``points`` and ``shift`` (V, 3, B), ``rotations`` (B, 3, 3) and ``translations`` (B, 3) float32, ``out`` (B, V, 3).
+    ``points`` and ``shift`` (V, 3, B), ``turns`` (B, 3, 3) and ``translations`` (B, 3) float32, ``out`` (B, V, 3).
     """
     n_vertices, _, n_frames = points.shape
-    turn, start = np.empty((3, 3, n_frames), points.dtype), np.empty((3, n_frames), points.dtype)
-    x, moved = np.empty((3, n_frames), points.dtype), np.empty((_TILE, 3, n_frames), points.dtype)
-    for b in range(n_frames):
-        for k in range(3):
-            start[k, b] = translations[b, k]
-            for i in range(3):
-                turn[k, i, b] = scale * rotations[b, k, i]
     for first in range(0, n_vertices, _TILE):
         last = min(n_vertices, first + _TILE)
-        for v in range(first, last):
-            p = position[v]
-            for i in range(3):
-                for b in range(n_frames):
-                    x[i, b] = points[p, i, b] + shift[p, i, b]
-            for k in range(3):
-                for b in range(n_frames):
-                    turned = turn[k, 0, b] * x[0, b] + turn[k, 1, b] * x[1, b] + turn[k, 2, b] * x[2, b]
-                    moved[v - first, k, b] = turned + start[k, b]
         for b in range(n_frames):
+            turn, start = turns[b], translations[b]
             for v in range(first, last):
+                p = position[v]
+                x, y, z = points[p, 0, b], points[p, 1, b], points[p, 2, b]
+                x, y, z = x + shift[p, 0, b], y + shift[p, 1, b], z + shift[p, 2, b]
                 for k in range(3):
-                    out[b, v, k] = moved[v - first, k, b]
+                    out[b, v, k] = turn[k, 0] * x + turn[k, 1] * y + turn[k, 2] * z + start[k]
 
 
-@njit(**_OPTIONS)
-def _average_rows(starts, neighbours, share, own, first, last, current, coefficient, block, total, previous):
+@njit(**_ARITHMETIC)
+def _average_rows(starts, neighbours, share, own, first, last, current, coefficient, block, previous):
     """Rows ``first <= i < last`` of ``previous <- coefficient block + own current - share A current - previous``.
 
-    Four neighbours at a time: ``total`` is then read and written a quarter as often.
+    Four neighbours at a time: what is written is then read again a quarter as often.
     """
-    n_columns = len(total)
+    n_columns = block.shape[1]
     for i in range(first, last):
-        p, stop = starts[i], starts[i + 1]
-        if p + 4 <= stop:
-            j, k, m, n = neighbours[p], neighbours[p + 1], neighbours[p + 2], neighbours[p + 3]
-            for c in range(n_columns):
-                total[c] = (current[j, c] + current[k, c]) + (current[m, c] + current[n, c])
-            p += 4
-        else:
-            total[:] = 0
+        p, stop, s = starts[i], starts[i + 1], share[i]
+        for c in range(n_columns):
+            previous[i, c] = coefficient * block[i, c] + own * current[i, c] - previous[i, c]
         while p + 4 <= stop:
             j, k, m, n = neighbours[p], neighbours[p + 1], neighbours[p + 2], neighbours[p + 3]
             for c in range(n_columns):
-                total[c] += (current[j, c] + current[k, c]) + (current[m, c] + current[n, c])
+                previous[i, c] -= s * ((current[j, c] + current[k, c]) + (current[m, c] + current[n, c]))
             p += 4
         while p < stop:
             j = neighbours[p]
             for c in range(n_columns):
-                total[c] += current[j, c]
+                previous[i, c] -= s * current[j, c]
             p += 1
-        s = share[i]
-        for c in range(n_columns):
-            previous[i, c] = coefficient * block[i, c] + own * current[i, c] - s * total[c] - previous[i, c]
 
 
-@njit(**_OPTIONS)
+@njit(**_ARITHMETIC)
 def chebyshev_of_average(starts, neighbours, share, own, coefficients, bandwidth, depth, block, out, spare):
     """``out <- sum_k c_k T_k(S) block`` (V, C) by Clenshaw's recurrence, ``S x = own x - share (sum over neighbours)``.
 
@@ -151,7 +129,6 @@ def chebyshev_of_average(starts, neighbours, share, own, coefficients, bandwidth
         for c in range(block.shape[1]):
             current[i, c] = coefficients[degree] * block[i, c]
             previous[i, c] = 0
-    total = np.empty(block.shape[1], block.dtype)
     double = share + share
     n_chunks = (n_rows + bandwidth - 1) // bandwidth
     done = 0
@@ -165,126 +142,75 @@ def chebyshev_of_average(starts, neighbours, share, own, coefficients, bandwidth
                 # Not swapped but chosen, since the steps of a front alternate.
                 read, write = (current, previous) if (done + step) % 2 == 0 else (previous, current)
                 weight, at = (share, own) if k == 0 else (double, own + own)
-                _average_rows(starts, neighbours, weight, at, first, last, read, coefficients[k], block, total, write)
+                _average_rows(starts, neighbours, weight, at, first, last, read, coefficients[k], block, write)
         done += steps
 
 
-@njit(**_OPTIONS)
+@njit(**_ARITHMETIC)
 def _accumulate_normals(points, triangles, normals):
     """Area-weighted normals (not normalised) of every vertex in every frame; all arrays ``(V, 3, B)``."""
-    n_vertices, _, n_frames = points.shape
-    width = 3 * n_frames
-    rows, sums = points.reshape(n_vertices, width), normals.reshape(n_vertices, width)
-    sums[:] = 0
-    u, v = np.empty((3, n_frames), points.dtype), np.empty((3, n_frames), points.dtype)
-    cross = np.empty((3, n_frames), points.dtype)
-    u_row, v_row, cross_row = u.reshape(width), v.reshape(width), cross.reshape(width)
+    normals[:] = 0
     for f in range(len(triangles)):
         i, j, k = triangles[f, 0], triangles[f, 1], triangles[f, 2]
-        for c in range(width):
-            u_row[c] = rows[j, c] - rows[i, c]
-        for c in range(width):
-            v_row[c] = rows[k, c] - rows[i, c]
-        _cross(u, v, cross)
-        for c in range(width):
-            sums[i, c] += cross_row[c]
-        for c in range(width):
-            sums[j, c] += cross_row[c]
-        for c in range(width):
-            sums[k, c] += cross_row[c]
+        for t in range(points.shape[2]):
+            ux, uy, uz = (
+                points[j, 0, t] - points[i, 0, t],
+                points[j, 1, t] - points[i, 1, t],
+                points[j, 2, t] - points[i, 2, t],
+            )
+            vx, vy, vz = (
+                points[k, 0, t] - points[i, 0, t],
+                points[k, 1, t] - points[i, 1, t],
+                points[k, 2, t] - points[i, 2, t],
+            )
+            x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+            for v in (i, j, k):
+                normals[v, 0, t] += x
+                normals[v, 1, t] += y
+                normals[v, 2, t] += z
 
 
-@njit(**_OPTIONS)
-def _cross(a, b, out):
-    """Cross products of vectors (3, n)."""
-    for k in range(3):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        for t in range(a.shape[1]):
-            out[k, t] = a[i, t] * b[j, t] - a[j, t] * b[i, t]
+@njit(forceinline=True, **_OPTIONS)
+def _unit(x, y, z):
+    one, tiny = np.float32(1), np.float32(1e-20)
+    scale = one / max(np.sqrt(x * x + y * y + z * z), tiny)
+    return x * scale, y * scale, z * scale
 
 
-@njit(**_OPTIONS)
-def _normalise(a, length):
-    """Vectors (3, n) to unit length; ``length`` (n,) is scratch."""
-    tiny, one = np.float32(1e-20), np.float32(1)
-    for t in range(len(length)):
-        length[t] = one / max(np.sqrt(a[0, t] * a[0, t] + a[1, t] * a[1, t] + a[2, t] * a[2, t]), tiny)
-    for k in range(3):
-        for t in range(len(length)):
-            a[k, t] *= length[t]
+@njit(forceinline=True, **_OPTIONS)
+def _local_frame(points, normals, v, w, t):
+    """Tangent, towards the neighbour ``w``, bitangent and normal of vertex ``v`` in frame ``t``: nine numbers."""
+    nx, ny, nz = _unit(normals[v, 0, t], normals[v, 1, t], normals[v, 2, t])
+    tx, ty, tz = points[w, 0, t] - points[v, 0, t], points[w, 1, t] - points[v, 1, t], points[w, 2, t] - points[v, 2, t]
+    along = tx * nx + ty * ny + tz * nz
+    tx, ty, tz = _unit(tx - along * nx, ty - along * ny, tz - along * nz)
+    return tx, ty, tz, ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx, nx, ny, nz
 
 
-@njit(**_OPTIONS)
-def _work_array(points):
-    """Room for one vector a frame, for as many vertices as are worked on together, (3, n, B)."""
-    return np.zeros((3, max(1, _TOGETHER // points.shape[2]), points.shape[2]), points.dtype)
-
-
-@njit(**_OPTIONS)
-def _frames_at(points, normals, neighbour, first, last, tangent, bitangent, normal):
-    """Local frames of vertices ``first <= v < last`` in all frames of the block, (3, n, B) each."""
-    n_frames = points.shape[2]
-    for v in range(first, last):
-        w, i = neighbour[v], v - first
-        for k in range(3):
-            for t in range(n_frames):
-                normal[k, i, t] = normals[v, k, t]
-            for t in range(n_frames):
-                tangent[k, i, t] = points[w, k, t] - points[v, k, t]
-    n = normal.size // 3
-    flat_tangent, flat_normal, scratch = tangent.reshape(3, n), normal.reshape(3, n), bitangent.reshape(3, n)[0]
-    _normalise(flat_normal, scratch)
-    _dot(flat_tangent, flat_normal, scratch)
-    for k in range(3):
-        for t in range(n):
-            flat_tangent[k, t] -= scratch[t] * flat_normal[k, t]
-    _normalise(flat_tangent, scratch)
-    _cross(flat_normal, flat_tangent, bitangent.reshape(3, n))
-
-
-@njit(**_OPTIONS)
-def _dot(a, b, out):
-    """Dot products (n,) of vectors (3, n)."""
-    for t in range(len(out)):
-        out[t] = a[0, t] * b[0, t] + a[1, t] * b[1, t] + a[2, t] * b[2, t]
-
-
-@njit(**_OPTIONS)
-def take_details(points, triangles, neighbour, normals, smooth, rest_offset, rest_detail, delta):
-    """Turn deltas into motion details, in place: ``d = F^T (delta - smooth + rest_offset) - e_0`` (method 3, Eq. 3).
+@njit(**_ARITHMETIC)
+def take_details(points, triangles, neighbour, normals, smooth, delta, rest_offset, rest_detail, out):
+    """Turn deltas into motion details, ``d = F^T (delta - smooth + rest_offset) - e_0`` (method 3, Eq. 3).
 
     ``points`` (V, 3, B) are smoothed, ``smooth`` and ``delta`` (V, 3, B) the smoothed and the full change since rest,
     ``rest_offset`` and ``rest_detail`` (V, 3) the rest shape's detail, plain and in its local frames; ``normals``
     (V, 3, B) is scratch.
     """
     _accumulate_normals(points, triangles, normals)
-    n_vertices, _, n_frames = points.shape
-    tangent, bitangent, normal = _work_array(points), _work_array(points), _work_array(points)
-    x, along = _work_array(points), _work_array(points)
-    together = x.shape[1]
-    n = together * n_frames
-    flat_x, flat_along = x.reshape(3, n), along.reshape(3, n)
-    for first in range(0, n_vertices, together):
-        last = min(n_vertices, first + together)
-        _frames_at(points, normals, neighbour, first, last, tangent, bitangent, normal)
-        for v in range(first, last):
-            i = v - first
-            for k in range(3):
-                offset = rest_offset[v, k]
-                for t in range(n_frames):
-                    x[k, i, t] = delta[v, k, t] - smooth[v, k, t] + offset
-        _dot(tangent.reshape(3, n), flat_x, flat_along[0])
-        _dot(bitangent.reshape(3, n), flat_x, flat_along[1])
-        _dot(normal.reshape(3, n), flat_x, flat_along[2])
-        for v in range(first, last):
-            i = v - first
-            for k in range(3):
-                own = rest_detail[v, k]
-                for t in range(n_frames):
-                    delta[v, k, t] = along[k, i, t] - own
+    for v in range(len(points)):
+        w = neighbour[v]
+        ox, oy, oz = rest_offset[v, 0], rest_offset[v, 1], rest_offset[v, 2]
+        ex, ey, ez = rest_detail[v, 0], rest_detail[v, 1], rest_detail[v, 2]
+        for t in range(points.shape[2]):
+            tx, ty, tz, bx, by, bz, nx, ny, nz = _local_frame(points, normals, v, w, t)
+            x = delta[v, 0, t] - smooth[v, 0, t] + ox
+            y = delta[v, 1, t] - smooth[v, 1, t] + oy
+            z = delta[v, 2, t] - smooth[v, 2, t] + oz
+            out[v, 0, t] = tx * x + ty * y + tz * z - ex
+            out[v, 1, t] = bx * x + by * y + bz * z - ey
+            out[v, 2, t] = nx * x + ny * y + nz * z - ez
 
 
-@njit(**_OPTIONS)
+@njit(**_ARITHMETIC)
 def rotate_details(points, triangles, neighbour, normals, details, order, gain, rest_detail, out):
     """Turn local details into displacements of the frame: ``out = F (e_0 + gain d)`` (method 7, Eqs. 5 and 16).
 
@@ -292,24 +218,15 @@ def rotate_details(points, triangles, neighbour, normals, details, order, gain, 
     order; ``gain`` (V,), ``rest_detail`` (V, 3); ``normals`` is scratch.
     """
     _accumulate_normals(points, triangles, normals)
-    n_vertices, _, n_frames = points.shape
-    tangent, bitangent, normal = _work_array(points), _work_array(points), _work_array(points)
-    x = _work_array(points)
-    together = x.shape[1]
-    for first in range(0, n_vertices, together):
-        last = min(n_vertices, first + together)
-        _frames_at(points, normals, neighbour, first, last, tangent, bitangent, normal)
-        for v in range(first, last):
-            i, old, g = v - first, order[v], gain[v]
-            for t in range(n_frames):
-                for k in range(3):
-                    x[k, i, t] = g * details[t, old, k] + rest_detail[v, k]
-        for v in range(first, last):
-            i = v - first
-            for k in range(3):
-                for t in range(n_frames):
-                    turned = tangent[k, i, t] * x[0, i, t] + bitangent[k, i, t] * x[1, i, t]
-                    out[v, k, t] = turned + normal[k, i, t] * x[2, i, t]
+    for v in range(len(points)):
+        w, old, g = neighbour[v], order[v], gain[v]
+        ex, ey, ez = rest_detail[v, 0], rest_detail[v, 1], rest_detail[v, 2]
+        for t in range(points.shape[2]):
+            tx, ty, tz, bx, by, bz, nx, ny, nz = _local_frame(points, normals, v, w, t)
+            x, y, z = g * details[t, old, 0] + ex, g * details[t, old, 1] + ey, g * details[t, old, 2] + ez
+            out[v, 0, t] = tx * x + bx * y + nx * z
+            out[v, 1, t] = ty * x + by * y + ny * z
+            out[v, 2, t] = tz * x + bz * y + nz * z
 
 
 @njit(**_OPTIONS)
@@ -319,17 +236,12 @@ def block_frames(points, triangles, neighbour):
     normals = np.empty_like(points)
     _accumulate_normals(points, triangles, normals)
     frames = np.empty((n_vertices, 3, 3, n_frames), points.dtype)
-    tangent, bitangent, normal = _work_array(points), _work_array(points), _work_array(points)
-    together = normal.shape[1]
-    for first in range(0, n_vertices, together):
-        last = min(n_vertices, first + together)
-        _frames_at(points, normals, neighbour, first, last, tangent, bitangent, normal)
-        for v in range(first, last):
-            i = v - first
+    for v in range(n_vertices):
+        for t in range(n_frames):
+            columns = _local_frame(points, normals, v, neighbour[v], t)
             for k in range(3):
-                for t in range(n_frames):
-                    frames[v, k, 0, t], frames[v, k, 1, t] = tangent[k, i, t], bitangent[k, i, t]
-                    frames[v, k, 2, t] = normal[k, i, t]
+                for i in range(3):
+                    frames[v, i, k, t] = columns[3 * k + i]
     return frames
 
 
