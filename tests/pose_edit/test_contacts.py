@@ -83,7 +83,7 @@ def test_the_cost_is_that_of_each_basis_alone(blinking: EditableTake) -> None:
     two = ContactPairs(*(np.concatenate(x) for x in joined))
     rng = np.random.default_rng(4)
     both = TouchingPairs(two, rng.uniform(0, 1, (blinking.n_frames, len(two))))
-    found = both.costs(blinking.moves_at(two.vertices), 5, 9)
+    found = both.touching[5:10] @ both.opened_by(blinking.moves_at(two.vertices))
     gaps = two.gaps(blinking.moves)  # (K, P, 3)
     share = np.where(np.arange(len(two)) < len(contacts.pairs), 1 / len(contacts.pairs), 1 / 12)
     for n, t in enumerate(range(5, 10)):

@@ -15,6 +15,7 @@ constraints better nor held lids and lips better.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,18 +50,18 @@ class TouchingPairs:
         opening = self._openings[0]
         return TouchingPairs(pairs, np.where(np.isin(opening, opening[pulled]), 0.0, self.touching))
 
-    def costs(self, moves: Array, first: int, last: int) -> Array:
-        """What each weight's change costs in the frames from ``first`` to ``last``, (n, K), in squared mesh units.
+    def opened_by(self, moves: Array) -> Array:
+        """What each basis opens, (P, K), in squared mesh units: ``touching @`` it is what each weight costs, (T, K).
 
         ``moves`` (K, n, 3) are the bases' displacements at ``pairs.vertices``.
         """
         ids = self.pairs.vertices
         gap = self.pairs.rows(int(ids.max(initial=-1)) + 1)[:, ids]
-        opened = np.stack([np.sum((gap @ move) ** 2, axis=1) for move in moves], axis=1)  # (P, K)
+        squared = np.stack([np.sum((gap @ move) ** 2, axis=1) for move in moves], axis=1)
         opening, count = self._openings
-        return np.asarray(self.touching[first : last + 1] @ (opened / count[opening][:, None]))
+        return np.asarray(squared / count[opening][:, None])
 
-    @property
+    @cached_property
     def _openings(self) -> tuple[Ids, Ids]:
         """Which opening each pair belongs to (P,), and how many pairs each opening has."""
         _, opening, count = np.unique(self.pairs.corners, axis=0, return_inverse=True, return_counts=True)

@@ -57,12 +57,13 @@ class PoseEditor:
         self._diagonal = float(np.sqrt(np.sum(np.ptp(take.rest, axis=0) ** 2)))
         self._responses: OrderedDict[tuple[float, float, bytes], Responses] = OrderedDict()
         self._gram: tuple[NDArray[np.int64], Array] | None = None
+        self._opened: Array | None = None
         self._last: tuple[EditParameters, Array] | None = None
 
     def following(self, take: EditableTake) -> PoseEditor:
         """An editor of the same face after other edits; what does not depend on them is shared."""
         other = copy.copy(self)
-        other.take, other._gram, other._last = take, None, None
+        other.take, other._gram, other._opened, other._last = take, None, None, None
         return other
 
     def solve(
@@ -181,7 +182,10 @@ class PoseEditor:
         contacts = self.take.contacts
         if contacts is None or weight == 0:
             return None
-        return weight * contacts.let_go(rows.vertices).costs(self.take.moves_at(contacts.pairs.vertices), *window)
+        if self._opened is None:
+            self._opened = contacts.opened_by(self.take.moves_at(contacts.pairs.vertices))
+        first, last = window
+        return np.asarray(weight * contacts.let_go(rows.vertices).touching[first : last + 1] @ self._opened)
 
     def _result(
         self,
