@@ -124,13 +124,13 @@ def smile(face: Face) -> list[NDArray[np.uint8]]:
     """Pictures of the smile, from the side of its crow's feet."""
     families = hand_made("wrinkles")["families"]
     crow = [face.curve([[-s, y] for s, y in line]) for line in families["crow"]["lines"]]
-    region = within(face.take.surface, crow[0], 0.3, soft=0.15)
+    region = within(face.take.surface, crow[0], 0.3, soft=0.3)
     for line in crow[1:]:
-        region = region.joined(within(face.take.surface, line, 0.3, soft=0.15))
+        region = region.joined(within(face.take.surface, line, 0.3, soft=0.3))
     fold = face.curve([[-s, y] for s, y in families["smile_fold"]["lines"][0]])
-    beside = within(face.take.surface, fold, 0.6, soft=0.2)
+    beside = within(face.take.surface, fold, 1.2, soft=0.6)
     common: dict[str, Any] = {"frame": 1, "window": (1, 1)}
-    goal = face.curve([[-2.0, -4.0], [-3.4, -4.4], [-4.9, -5.2], [-5.7, -6.4], [-5.6, -7.8]])
+    goal = face.curve([[-2.2, -3.5], [-3.3, -4.2], [-4.4, -5.2], [-5.2, -6.4], [-5.5, -7.8]])
     both = region.joined(beside)
     edits: list[list[DetailEdit]] = [
         [],
@@ -140,9 +140,9 @@ def smile(face: Face) -> list[NDArray[np.uint8]]:
             PasteEdit(
                 region=region,
                 start=crow[1].point(len(crow[1]) // 2),
-                goal=face.point(-6.0, -4.0),
-                scale=1.4,
-                strength=0.9,
+                goal=face.point(-6.9, -3.2),
+                scale=1.9,  # the cheek's mesh is coarser than that beside the eye
+                strength=0.65,
                 **common,
             )
         ],
