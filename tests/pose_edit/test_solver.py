@@ -228,6 +228,9 @@ def test_bad_input_is_refused(bump: TriangleMesh, face: EditableTake) -> None:
         editor.solve([PointConstraint(5, 1, offset=(0, 0, 0))], EditParameters(mode="weights", window=(8, 28)))
     with pytest.raises(InputError, match="does not lie in the take"):
         editor.solve([PointConstraint(5, 1, offset=(0, 0, 0))], EditParameters(window=(8, 60)))
+    twice = [PointConstraint(KEY, 3, offset=(0, 0, z), weight=1e17) for z in (0.1, 0.2)]
+    with pytest.raises(InputError, match="weigh so much"):
+        editor.solve(twice)
     with pytest.raises(InputError, match="either a place or an offset"):
         PointConstraint(0, 1)
     with pytest.raises(InputError, match="no place"):

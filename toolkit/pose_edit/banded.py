@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import cholesky_banded
-from scipy.linalg.lapack import dpotrf, dpotrs
+from scipy.linalg.lapack import dgetrf, dgetrs
 
 from toolkit.compiled import njit
 
@@ -32,24 +32,25 @@ class FrameRows:
     local: Array
 
     @cached_property
-    def distinct(self) -> Ids:
-        """The frames, each once, (F,)."""
-        return np.unique(self.frames)
+    def distinct(self) -> tuple[Ids, Ids]:
+        """The frames, each once (F,), and which of them each row sees, (R,)."""
+        frames, which = np.unique(self.frames, return_inverse=True)
+        return frames, which
 
     @cached_property
-    def dense(self) -> Array:
-        """``B`` over these frames alone, (R, F K)."""
-        which = self.frames[:, None] == self.distinct
-        return np.asarray((which[:, :, None] * self.local[:, None]).reshape(len(self.frames), -1))
+    def _together(self) -> Array:
+        """Adds up the rows of each frame, (F, R)."""
+        frames, which = self.distinct
+        return np.equal.outer(np.arange(len(frames)), which).astype(np.float64)
 
     def of(self, change: Array) -> Array:
         """``B u`` (R,)."""
-        return np.asarray(self.dense @ change[self.distinct].ravel())
+        return np.asarray(np.einsum("ak,ak->a", self.local, change[self.frames]))
 
     def spread(self, values: Array, like: Array) -> Array:
         """``B^T values`` (n, K)."""
         result = np.zeros_like(like)
-        result[self.distinct] = (values @ self.dense).reshape(-1, like.shape[1])
+        result[self.distinct[0]] = self._together @ (values[:, None] * self.local)
         return result
 
 
@@ -72,16 +73,16 @@ def frame_bands(time: sp.csr_matrix, gram: Array) -> Array:
 
 
 class SmallFactor:
-    """Cholesky factor of a small positive definite matrix (R, R); SciPy's own call takes longer than LAPACK's work."""
+    """LU factors of a small matrix (R, R), by LAPACK itself: SciPy's own call takes longer than the work."""
 
     def __init__(self, matrix: Array) -> None:
-        self._factor, failed = dpotrf(matrix, clean=False)
+        self._factors, self._pivots, failed = dgetrf(matrix)
         if failed:
-            raise np.linalg.LinAlgError("the constraints' matrix is not positive definite")
+            raise np.linalg.LinAlgError("the constraints' matrix is singular")
 
     def solve(self, right: Array) -> Array:
-        """Solve for (R,) or (R, C)."""
-        return np.asarray(dpotrs(self._factor, right)[0])
+        """Solve for (R,)."""
+        return np.asarray(dgetrs(self._factors, self._pivots, right)[0])
 
 
 class System:
@@ -142,12 +143,12 @@ class _Chains:
 
     def answers(self, rows: FrameRows) -> Array:
         """``B P^-1 B^T`` (R, R), from the columns of ``P^-1`` at the rows' frames."""
-        (_, n, n_bases), frames = self._factor.shape, rows.distinct
+        _, n, n_bases = self._factor.shape
+        frames, which = rows.distinct
         columns = np.zeros((n, len(frames), n_bases))
         columns[frames, np.arange(len(frames))] = 1
         _substitute_chains(self._factor, columns, int(frames.min(initial=n)))
-        seen = rows.local[:, None] * columns[rows.frames]
-        return np.asarray(seen.reshape(len(seen), -1) @ rows.dense.T)
+        return np.asarray(_between_rows(rows.local, rows.frames, which, columns))
 
 
 class _Frames:
@@ -169,7 +170,7 @@ class _Frames:
         pulls = np.zeros((len(self._factor) // n_bases, n_bases, n_rows))
         pulls[rows.frames, :, np.arange(n_rows)] = rows.local
         halves = pulls.reshape(-1, n_rows)
-        _forward(self._factor, halves, int(rows.distinct.min(initial=0)) * n_bases)
+        _forward(self._factor, halves, int(rows.frames.min(initial=0)) * n_bases)
         return np.asarray(halves.T @ halves)
 
 
@@ -209,6 +210,20 @@ def _substitute_chains(factor, columns, start):  # type: ignore[no-untyped-def] 
             x, near, far = columns[i, c], columns[min(i + 1, n - 1), c], columns[min(i + 2, n - 1), c]
             for k in range(count):
                 x[k] = x[k] * inverse[k] - first[k] * near[k] - second[k] * far[k]
+
+
+@njit(cache=True, nogil=True)
+def _between_rows(local, frames, which, columns):  # type: ignore[no-untyped-def]  # compiled
+    """``sum_k local[a, k] columns[frames[a], which[b], k] local[b, k]``, symmetric, (R, R)."""
+    n_rows, count = local.shape
+    between = np.empty((n_rows, n_rows))
+    for a in range(n_rows):
+        for b in range(a + 1):
+            total = 0.0
+            for k in range(count):
+                total += local[a, k] * columns[frames[a], which[b], k] * local[b, k]
+            between[a, b] = between[b, a] = total
+    return between
 
 
 @njit(cache=True, nogil=True)

@@ -91,7 +91,12 @@ class PoseEditor:
         change = np.zeros_like(problem.weights.lower)
         if warm and self._last is not None and self._last[0] == parameters:
             change = np.maximum(self._last[1], problem.weights.lower)
-        state, energies = solve_in_rounds(problem, change, parameters, progress)
+        try:
+            state, energies = solve_in_rounds(problem, change, parameters, progress)
+        except np.linalg.LinAlgError as error:
+            raise InputError(
+                "some constraints weigh so much that nothing is left of the rest", remedy="give smaller weights"
+            ) from error
         self._last = (parameters, state.change)
         residuals = self._residuals(constraints, resolved, rows, problem, state)
         return self._result(rows, problem, state, residuals, energies)
