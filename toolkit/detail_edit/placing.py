@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from toolkit.detail_edit.bend import bent_along
 from toolkit.detail_edit.carry import Carrier, carrier
@@ -118,10 +119,13 @@ def _reshape_patch(edit: ReshapeEdit, region: Region, take: DetailTake) -> FlatP
     """All that lies no farther from the wrinkle than the goal and the region do, and a margin."""
     surface = take.surface
     margin = _MARGIN * surface.edge(region.vertices)
-    gap = surface.distance(edit.curve)
-    farthest = max(
-        float(gap[region.vertices].max()), float(gap[np.unique(surface.triangles[edit.goal.triangles])].max())
-    )
+    needed = np.union1d(region.vertices, surface.triangles[edit.goal.triangles])
+    straight = cKDTree(surface.places(edit.curve)).query(surface.vertices[needed])[0]
+    for limit in (1.5 * float(straight.max()) + 2 * margin, np.inf):
+        gap = surface.distance(edit.curve, limit)
+        farthest = float(gap[needed].max())
+        if farthest + margin <= limit:
+            break
     if not np.isfinite(farthest):
         raise InputError("the region and the two curves do not lie on one part of the face that hangs together")
     centre = edit.curve.point(len(edit.curve) // 2)
