@@ -20,7 +20,8 @@ __all__ = ["ARCS", "RIMS", "TARGETS", "Truth", "build_target"]
 
 Array = NDArray[np.float64]
 
-TARGETS: tuple[str, ...] = ("asian_female", "african_old", "orc", "hound")
+TARGETS: tuple[str, ...] = ("asian_female", "african_old", "orc", "hound", "child")
+"""The child is held out: no parameter of the registration was ever chosen by it."""
 
 ARCS = ("eyelid_left", "eyelid_right", "lip_inner", "lip_outer")
 """Openings whose rim is given as ``<name>_upper`` and ``<name>_lower``, corner to corner, and whole as ``<name>``."""
