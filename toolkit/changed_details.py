@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.decomposition import Decomposer
-from toolkit.kernels import block_frames
+from toolkit.kernels import block_frames, rotate_details
 from toolkit.mesh.patch import FramePatch
 
 __all__ = ["ChangedDetails", "DetailsChange"]
@@ -58,7 +58,12 @@ class ChangedDetails:
         own = np.array(self._own)
         for change in changes:
             change.apply_static(own, self._vertices)
-        self._own_change = (own - self._own).astype(np.float32)
+        self._own_change = np.zeros((len(self._patch.ids), 3), dtype=np.float32)
+        self._own_change[self._patch.at] = own - self._own
+        # Where the kernel finds the change of each vertex of the patch; what it finds for the others is not used.
+        self._order = np.zeros(len(self._patch.ids), dtype=np.int64)
+        self._order[self._patch.at] = np.arange(len(self._vertices))
+        self._ones = np.ones(len(self._patch.ids), dtype=np.float32)
 
     def add(
         self,
@@ -78,12 +83,26 @@ class ChangedDetails:
         acting = [c for c in self._changes if c.window[0] < stop and c.window[1] >= start]
         if not acting and not self._own_change.any():
             return
-        frames = block_frames(points[self._patch.ids], self._patch.triangles, self._patch.neighbour)[self._patch.at]
+        here = points[self._patch.ids]
         if as_seen:
+            frames = block_frames(here, self._patch.triangles, self._patch.neighbour)[self._patch.at]
             plain = (np.einsum("vjib,vjb->bvi", frames, shift[self._rows]) - self._own).astype(np.float32)
         else:
             plain = details[:, self._vertices] * self._gain
         changed = plain.copy()
         for change in acting:
             change.apply(changed, start, self._vertices)
-        shift[self._rows] += np.einsum("vijb,bvj->vib", frames, changed - plain + self._own_change)
+        changed -= plain
+        added = np.empty_like(here)
+        rotate_details(
+            here,
+            self._patch.triangles,
+            self._patch.neighbour,
+            np.empty_like(here),
+            changed,
+            self._order,
+            self._ones,
+            self._own_change,
+            added,
+        )
+        shift[self._rows] += added[self._patch.at]
