@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,17 @@ def test_onto_itself_the_source_comes_back(bump: TriangleMesh, take: np.ndarray,
     shot = make_shot(tmp_path, bump, moved, bump.vertices, ALL_BASES)
     run_stages(shot)
     assert np.abs(shot.array("result", "frames") - moved).max() < 1e-6 * bump.diagonal
+
+
+def test_stages_cut_short_are_made_anew(bump: TriangleMesh, take: np.ndarray, tmp_path: Path) -> None:
+    shot = make_shot(tmp_path, bump, take, bump.vertices)
+    run_stages(shot)
+    whole = shot.frames_path.read_bytes()
+    for file, left in ((shot.stage_folder("decompose") / "details.npy", 500), (shot.frames_path, 20)):
+        os.truncate(file, left)
+    done = {report.stage: report.skipped for report in run_stages(shot)}
+    assert (done["register"], done["decompose"], done["bases"], done["result"]) == (True, False, True, False)
+    assert shot.frames_path.read_bytes() == whole
 
 
 def test_a_moved_copy_gives_the_moved_performance(bump: TriangleMesh, take: np.ndarray, tmp_path: Path) -> None:
