@@ -13,18 +13,22 @@ from toolkit.mesh.geometry import local_frames
 KEY = 30
 
 
-def sheet(n: int, m: int, height: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """A sheet over [-1, 1] x [-1.2, 1.2], unevenly spaced, domed by ``height``, higher below; normals towards +z."""
+def net(n: int, m: int) -> np.ndarray:
+    """Triangles of a grid of n by m vertices."""
     i, j = np.meshgrid(np.arange(n - 1), np.arange(m - 1), indexing="ij")
     a = (i * m + j).ravel()
     b, c, d = a + m, a + m + 1, a + 1
-    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.int32)
+    return np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.int32)
+
+
+def sheet(n: int, m: int, height: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """A sheet over [-1, 1] x [-1.2, 1.2], unevenly spaced, domed by ``height``, higher below; normals towards +z."""
     u, v = (x.ravel() for x in np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1.2, 1.2, m), indexing="ij"))
     rng = np.random.default_rng(5)
     u, v = u + rng.uniform(-0.1, 0.1, n * m) / n, v + rng.uniform(-0.1, 0.1, n * m) / m
-    return np.column_stack(
-        [u, v, height * (np.exp(-(u**2) - v**2) + 0.4 * np.exp(-8 * (u**2 + (v + 0.6) ** 2)))]
-    ), triangles
+    return np.column_stack([u, v, height * (np.exp(-(u**2) - v**2) + 0.4 * np.exp(-8 * (u**2 + (v + 0.6) ** 2)))]), net(
+        n, m
+    )
 
 
 def wrinkle(points: np.ndarray, across: float, along: float, width: float = 0.05) -> np.ndarray:
@@ -37,6 +41,20 @@ def wrinkle(points: np.ndarray, across: float, along: float, width: float = 0.05
 @pytest.fixture(scope="session")
 def flat() -> Surface:
     return Surface(*sheet(61, 73))
+
+
+@pytest.fixture(scope="session")
+def grid() -> Callable[[int, int], np.ndarray]:
+    return net
+
+
+@pytest.fixture(scope="session")
+def globe() -> tuple[Surface, np.ndarray, np.ndarray]:
+    """A part of the unit sphere, 80 by 120 vertices, with the polar angle and the longitude of each."""
+    polar, longitude = np.meshgrid(np.linspace(0.4, 2.7, 80), np.linspace(0, 3.5, 120), indexing="ij")
+    sine = np.sin(polar)
+    points = np.stack([sine * np.cos(longitude), sine * np.sin(longitude), np.cos(polar)], -1).reshape(-1, 3)
+    return Surface(points, net(80, 120)), polar.ravel(), longitude.ravel()
 
 
 @pytest.fixture(scope="session")

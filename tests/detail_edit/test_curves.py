@@ -8,20 +8,11 @@ from toolkit.detail_edit.ground import Ground
 from toolkit.errors import InputError
 
 
-@pytest.fixture(scope="module")
-def ball() -> Surface:
-    n, m = 80, 120
-    polar, longitude = np.meshgrid(np.linspace(0.4, 2.7, n), np.linspace(0, 3.5, m), indexing="ij")
-    i, j = np.meshgrid(np.arange(n - 1), np.arange(m - 1), indexing="ij")
-    a = (i * m + j).ravel()
-    triangles = np.concatenate([np.stack([a, a + m, a + m + 1], 1), np.stack([a, a + m + 1, a + 1], 1)])
-    sine = np.sin(polar)
-    points = np.stack([sine * np.cos(longitude), sine * np.sin(longitude), np.cos(polar)], -1).reshape(-1, 3)
-    return Surface(points, triangles)
-
-
 @pytest.mark.parametrize(("start", "end"), [(20 * 120 + 20, 40 * 120 + 60), (20 * 120 + 20, 65 * 120 + 30)])
-def test_the_way_between_two_points_is_the_shortest(ball: Surface, start: int, end: int) -> None:
+def test_the_way_between_two_points_is_the_shortest(
+    globe: tuple[Surface, np.ndarray, np.ndarray], start: int, end: int
+) -> None:
+    ball, _, _ = globe
     curve = drawn(ball, [ball.at_vertex(start), ball.at_vertex(end)])
     places = ball.places(curve)
     a, b = ball.vertices[start], ball.vertices[end]

@@ -1,17 +1,13 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from toolkit.detail_edit import Surface
 from toolkit.detail_edit.bend import bent_along
 from toolkit.detail_edit.flatten import FlatPatch, flattened, located, minimal_turn
 from toolkit.detail_edit.region import Region
-
-
-def _grid(n: int, m: int) -> np.ndarray:
-    i, j = np.meshgrid(np.arange(n - 1), np.arange(m - 1), indexing="ij")
-    a = (i * m + j).ravel()
-    return np.concatenate([np.stack([a, a + m, a + m + 1], 1), np.stack([a, a + m + 1, a + 1], 1)])
 
 
 def _patch(points: np.ndarray, triangles: np.ndarray, centre: int, axes: np.ndarray, ids: np.ndarray) -> FlatPatch:
@@ -22,11 +18,11 @@ def _patch(points: np.ndarray, triangles: np.ndarray, centre: int, axes: np.ndar
     return patch
 
 
-def test_a_cylinder_unrolls_without_stretch() -> None:
+def test_a_cylinder_unrolls_without_stretch(grid: Callable[[int, int], np.ndarray]) -> None:
     n, m = 61, 41
     angle, height = np.meshgrid(np.linspace(-1.4, 1.4, n), np.linspace(-1, 1, m), indexing="ij")
     points = np.stack([np.sin(angle), height, np.cos(angle)], -1).reshape(-1, 3)
-    patch = _patch(points, _grid(n, m), 30 * m + 20, np.eye(3), np.arange(n * m))
+    patch = _patch(points, grid(n, m), 30 * m + 20, np.eye(3), np.arange(n * m))
     assert np.abs(patch.places - (angle + 1j * height).ravel()).max() < 1e-3
 
 

@@ -7,17 +7,6 @@ from toolkit.detail_edit import Curve, Surface, SurfacePoint
 from toolkit.errors import InputError
 
 
-def _ball(n: int = 60, m: int = 120) -> tuple[Surface, np.ndarray, np.ndarray]:
-    """A part of the unit sphere by polar angle and longitude."""
-    polar, longitude = np.meshgrid(np.linspace(0.5, 2.6, n), np.linspace(0, 3.5, m), indexing="ij")
-    i, j = np.meshgrid(np.arange(n - 1), np.arange(m - 1), indexing="ij")
-    a = (i * m + j).ravel()
-    triangles = np.concatenate([np.stack([a, a + m, a + m + 1], 1), np.stack([a, a + m + 1, a + 1], 1)])
-    sine = np.sin(polar)
-    points = np.stack([sine * np.cos(longitude), sine * np.sin(longitude), np.cos(polar)], -1).reshape(-1, 3)
-    return Surface(points, triangles), polar.ravel(), longitude.ravel()
-
-
 def test_on_flat_ground_the_distance_is_the_straight_one(flat: Surface) -> None:
     point = SurfacePoint(2000, (0.2, 0.3, 0.5))
     distance = flat.distance([point])
@@ -25,8 +14,8 @@ def test_on_flat_ground_the_distance_is_the_straight_one(flat: Surface) -> None:
     assert np.abs(distance - straight).max() < 2e-3 * straight.max()
 
 
-def test_on_a_sphere_the_distance_is_the_arc() -> None:
-    ball, _, _ = _ball()
+def test_on_a_sphere_the_distance_is_the_arc(globe: tuple[Surface, np.ndarray, np.ndarray]) -> None:
+    ball, _, _ = globe
     vertex = 30 * 120 + 60
     distance = ball.distance([ball.at_vertex(vertex)])
     arc = np.arccos(np.clip(ball.vertices @ ball.vertices[vertex], -1, 1))
@@ -34,8 +23,8 @@ def test_on_a_sphere_the_distance_is_the_arc() -> None:
     assert np.abs(distance / np.maximum(arc, 1e-9) - 1)[far].max() < 0.005
 
 
-def test_distance_to_a_line_is_across_it() -> None:
-    ball, polar, longitude = _ball()
+def test_distance_to_a_line_is_across_it(globe: tuple[Surface, np.ndarray, np.ndarray]) -> None:
+    ball, polar, longitude = globe
     points = [ball.at_vertex(30 * 120 + k) for k in range(10, 110)]
     line = Curve(np.array([p.triangle for p in points]), np.array([p.weights for p in points]))
     distance = ball.distance(line, 0.5)
