@@ -20,7 +20,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--script", type=Path, metavar="FILE", help="replay events from a file of JSON lines")
     made.add_argument("--record", type=Path, metavar="FILE", help="write every event to a file of JSON lines")
     made.add_argument("--state", type=Path, metavar="FILE", help="keep what is shown in a JSON file, for tests")
-    made.add_argument("--size", type=_size, default=(1500, 920), metavar="WxH", help="of the window (1500x920)")
+    made.add_argument("--size", type=_size, metavar="WxH", help="of the window, in pixels (1500x920 on a plain screen)")
     made.add_argument("-v", "--verbose", action="store_true", help="say more")
     return made
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from toolkit.rendering import Camera
+from toolkit.rendering.text import font
 from viewer import overlay, raycast, shading
 
 __all__ = ["load_compiled"]
@@ -19,4 +20,5 @@ def load_compiled() -> None:
     camera, out = Camera((0.0, 0.0, 9.0), (0.0, 0.0, 0.0)), np.empty_like(corners)
     shading.bake(corners, ids, out, shading.Light(), camera, out.copy(), out)
     edges = np.array([[0, 1]], np.int32)
+    font(12)  # reads a typeface, by a library that takes a second to come up
     overlay.wires(corners, edges, camera, 100, np.empty((4, 3), np.float32))

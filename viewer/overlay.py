@@ -28,7 +28,7 @@ _LIFT = 0.006  # of the distance to the camera
 _RIM = (0.05, 0.05, 0.06)
 
 
-def build(marks: Sequence[Mark], camera: Camera, height: int) -> Triangles:
+def build(marks: Sequence[Mark], camera: Camera, height: float) -> Triangles:
     """Corners ``(3 n, 3)`` of n triangles and their colours ``(3 n, 3)``, for a pane ``height`` pixels high."""
     corners: list[Array] = [np.zeros((0, 3))]
     colors: list[Array] = [np.zeros((0, 3))]
@@ -60,7 +60,7 @@ def wire_triangles(n_edges: int) -> NDArray[np.int32]:
 
 
 def wires(
-    vertices: NDArray[np.float32], edges: NDArray[np.int32], camera: Camera, height: int, out: NDArray[np.float32]
+    vertices: NDArray[np.float32], edges: NDArray[np.int32], camera: Camera, height: float, out: NDArray[np.float32]
 ) -> None:
     """Fill ``out`` (4 E, 3) with bands one pixel wide along ``edges`` (E, 2), a hair nearer to the camera."""
     eye = np.asarray(camera.position, dtype=np.float32)
@@ -89,7 +89,7 @@ def _wires(vertices: Any, edges: Any, eye: Any, share: Any, lift: Any, out: Any)
             out[b, 0], out[b, 1], out[b, 2] = ends[k, 0] + x, ends[k, 1] + y, ends[k, 2] + z
 
 
-def _fans(discs: Sequence[Disc], extra: float, lift: float, camera: Camera, height: int) -> Array:
+def _fans(discs: Sequence[Disc], extra: float, lift: float, camera: Camera, height: float) -> Array:
     """``(n, sides, 3, 3)`` corners of the discs' triangles."""
     right, above, _ = camera.axes()
     centres = _lifted(np.array([mark.position for mark in discs]), camera, lift)
@@ -101,7 +101,7 @@ def _fans(discs: Sequence[Disc], extra: float, lift: float, camera: Camera, heig
     return np.stack([middle, rims[:, :-1], rims[:, 1:]], axis=2)
 
 
-def _ribbon(curve: Curve, camera: Camera, height: int) -> Array:
+def _ribbon(curve: Curve, camera: Camera, height: float) -> Array:
     """Corners ``(6 s, 3)`` of a band along s segments, with corners rounded off by an overlap."""
     points = np.asarray(curve.points, dtype=np.float64).reshape(-1, 3)
     if curve.closed and len(points) > 2:

@@ -172,7 +172,7 @@ def ray_distance(origin: Array, direction: Array, points: NDArray[np.floating]) 
 
 
 def pixels_from_ray(
-    origin: Array, direction: Array, points: NDArray[np.floating], camera: Camera, height: int
+    origin: Array, direction: Array, points: NDArray[np.floating], camera: Camera, height: float
 ) -> Array:
     """How far ``points`` (n, 3) appear from the pointer, in pixels: ``(n,)``."""
     return ray_distance(origin, direction, points) / pixel_size(camera, points, height)

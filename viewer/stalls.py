@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any, TypeVar
 
 __all__ = ["FREEZE", "Stall", "StallWatch"]
@@ -23,11 +23,12 @@ class Stall:
     """How long one call took: ``wall`` seconds by the clock, ``own`` less the time in which others had the processor.
 
     ``own`` is what an idle machine would show: work, and waiting for locks and disks. It is the clock's where the
-    system does not tell (only Linux does).
+    system does not tell (only Linux does). ``cpu`` is the work alone.
     """
 
     wall: float
     own: float
+    cpu: float
 
 
 class StallWatch:
@@ -58,16 +59,16 @@ class StallWatch:
         return measured
 
     def _keep(self, kind: str, began: Stall, ended: Stall) -> None:
-        taken = Stall(ended.wall - began.wall, ended.own - began.own)
-        known = self.longest.get(kind, Stall(0.0, 0.0))
-        self.longest[kind] = Stall(max(known.wall, taken.wall), max(known.own, taken.own))
+        taken = Stall(ended.wall - began.wall, ended.own - began.own, ended.cpu - began.cpu)
+        known = self.longest.get(kind, taken)
+        self.longest[kind] = Stall(*map(max, astuple(known), astuple(taken)))
         if taken.own > FREEZE:
             log.info("%s: %.0f ms, %.0f ms on its own account", kind, 1e3 * taken.wall, 1e3 * taken.own)
 
 
 def _now() -> Stall:
     wall = time.perf_counter()
-    return Stall(wall, wall - _queued())
+    return Stall(wall, wall - _queued(), time.thread_time())
 
 
 def _queued() -> float:

@@ -32,6 +32,11 @@ class Screen:
     display: str
     buffer: Path
 
+    def set_density(self, dpi: int) -> None:
+        """What a desktop would tell programs of its screen; needs xprop."""
+        told = ["-format", "RESOURCE_MANAGER", "8s", "-set", "RESOURCE_MANAGER", f"Xft.dpi:\t{dpi}\n"]
+        subprocess.run(["xprop", "-root", *told], env={**os.environ, "DISPLAY": self.display}, check=True)
+
     def grab(self) -> NDArray[np.uint8]:
         """The picture ``(h, w, 3)``."""
         data = self.buffer.read_bytes()
@@ -42,11 +47,11 @@ class Screen:
 
 
 @contextmanager
-def screen(folder: Path, size: tuple[int, int], dpi: int = 96) -> Iterator[Screen]:
+def screen(folder: Path, size: tuple[int, int]) -> Iterator[Screen]:
     """An X server of a size (width, height), with its buffer in ``folder``, until the block ends."""
     for number in random.SystemRandom().sample(range(100, 10000), _TRIES):
         # With -displayfd the server takes no lock, and another one may take its place.
-        command = ["Xvfb", f":{number}", "-noreset", "-dpi", str(dpi), "-fbdir", str(folder)]
+        command = ["Xvfb", f":{number}", "-noreset", "-fbdir", str(folder)]
         command += ["-screen", "0", f"{size[0]}x{size[1]}x24"]
         server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         until = time.monotonic() + 20

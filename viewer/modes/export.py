@@ -9,6 +9,7 @@ from toolkit.errors import InputError
 from viewer.modes.base import Mode
 from viewer.stages_process import export_in_process
 from viewer.state.rows import Button, Check, Note, Row
+from viewer.worker import Cancelled
 
 if TYPE_CHECKING:
     from viewer.state.app import App
@@ -73,8 +74,15 @@ class ExportMode(Mode):
             self.app.say(f"{len(reports)} exported to {self.app.shot.export_folder}", "good")
             self.app.result_written()
 
+        def failed(error: Exception) -> None:
+            stopped = isinstance(error, Cancelled)
+            self.app.say("the export is stopped" if stopped else str(error), "bad")
+            self.app.touch("panel")
+
         self._written = []
-        self.app.run_task("exporting", lambda progress: export_in_process(folder, formats, progress), done)
+        self.app.run_task(
+            "exporting", lambda progress: export_in_process(folder, formats, progress), done, failed=failed
+        )
 
 
 def _in_words(report: dict[str, Any]) -> str:

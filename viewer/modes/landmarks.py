@@ -227,7 +227,7 @@ class LandmarkMode(Mode):
         if not on or event.hit is None:
             return -1
         ids = np.array([v for _, v in on])
-        camera, height = self.app.framing_camera(event.pane), self.app.pane_sizes[event.pane][1]
+        camera, height = self.app.framing_camera(event.pane), self.app.plain_height(event.pane)
         apart = pixels_from_ray(
             np.array(event.origin), np.array(event.direction), surface.vertices[ids], camera, height
         )
@@ -282,9 +282,13 @@ def _report(numbers: dict[str, Any]) -> list[Row]:
     """What the registration said of itself."""
     rows: list[Row] = []
     if "distance_95_share" in numbers:
-        shares = 100 * float(numbers["distance_median_share"]), 100 * float(numbers["distance_95_share"])
-        words = f"distance: {shares[0]:.2g} % of the face (median), {shares[1]:.2g} % (95th percentile)"
+        median, most = (_percent(numbers[name]) for name in ("distance_median_share", "distance_95_share"))
+        words = f"distance: {median} of the face (median), {most} (95th percentile)"
         rows.append(Note(words, "quiet"))
         rows.append(Note(f"worst landmark: {numbers.get('landmark_worst', '')}", "quiet"))
     rows += [Note(str(warning), "bad") for warning in numbers.get("warnings", [])[:3]]
     return rows
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %" if share > 1e-5 else "nothing"

@@ -66,6 +66,7 @@ class App(Scene):
         self.message, self.tone = "", "plain"
         self.solve_seconds: float | None = None
         self.quit_asked = False
+        self._running = False
         self._gestures = Gestures(self)
         self._changes: set[str] = set(ALL)
         self.modes: dict[str, Mode] = {mode.name: mode for mode in make_modes(self)}
@@ -158,8 +159,12 @@ class App(Scene):
         """Let time pass: playback, and results of long work."""
         if self.worker.drain():
             self.touch("status")
-        if self.worker.progress is not None:
+        running = self.worker.progress is not None
+        if running:
             self.touch("status")
+        if running is not self._running:
+            self._running = running
+            self.touch("status", "panel")  # to cancel it
         if self.play.advance(seconds, self._ready):
             self._frame_changed()
         if self.play.playing:

@@ -106,7 +106,7 @@ def pixel_ray(camera: Camera, x: float, y: float, size: tuple[int, int]) -> tupl
     return np.asarray(camera.position, dtype=np.float64), direction / np.linalg.norm(direction)
 
 
-def pixel_size(camera: Camera, points: ArrayLike, height: int) -> Array:
+def pixel_size(camera: Camera, points: ArrayLike, height: float) -> Array:
     """Width of one pixel at ``points`` (N, 3), in the mesh's unit: ``(N,)``."""
     _, _, toward = camera.axes()
     depth = (np.asarray(camera.position) - np.asarray(points, dtype=np.float64)) @ toward

@@ -13,6 +13,7 @@ from viewer.state.events import Command, Key, PanelInput, TimelineInput
 from viewer.state.fields import MAPS
 from viewer.state.panes import PAIRS
 from viewer.state.playhead import SPEEDS
+from viewer.worker import Cancelled
 
 if TYPE_CHECKING:
     from viewer.state.app import App
@@ -119,8 +120,8 @@ def _run_stages(app: App, which: Any) -> None:
             app.choose_pair("performance")
 
     def failed(error: Exception) -> None:
-        words = str(error) or "stopped; what was finished is kept"
-        app.say("stopped; what was finished is kept" if type(error).__name__ == "Cancelled" else words, "bad")
+        stopped = isinstance(error, Cancelled)
+        app.say("stopped; what was finished is kept" if stopped else str(error), "bad")
         app.reload()
 
     app.run_task("running", lambda progress: run_in_process(folder, stages, progress), done, failed=failed)

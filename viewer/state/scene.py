@@ -43,6 +43,7 @@ class Scene:
         self.map = "none"
         self.pair: Pair = PAIRS["performance" if data.has_result else "references"]
         self.pane_sizes = [(700, 700), (700, 700)]
+        self.density = 1.0  # pixels of the screen for one of a plain screen
         self._revision = 0
         self._surfaces: dict[str, tuple[Any, Surface]] = {}
         self._pickers: dict[str, tuple[Surface, Picker]] = {}
@@ -151,6 +152,10 @@ class Scene:
     def framing_camera(self, pane: int) -> Camera:
         """The camera of a pane."""
         return self.view_of(pane).camera(self.surface(pane).framing)
+
+    def plain_height(self, pane: int) -> float:
+        """A pane's height in pixels of a plain screen: what is a few pixels large is as large on a dense one."""
+        return self.pane_sizes[pane][1] / self.density
 
     def picker(self, pane: int) -> Picker:
         """The picker of the face as displayed."""

@@ -34,7 +34,6 @@ class Pane:
     def __init__(self, window: Any, app: App, index: int, send: Callable[[Pointer], None]) -> None:
         self.app, self.index, self._send = app, index, send
         self.widget, self.scene = native.new_scene(window)
-        self._zoom = window.theme.font_size / 16
         self._face: DynamicMesh | None = None
         self._triangles: Any = None
         self._normals = np.zeros((0, 3), np.float32)
@@ -86,10 +85,8 @@ class Pane:
     def draw_overlay(self) -> None:
         """Marks and numbers."""
         app = self.app
-        camera, height = app.framing_camera(self.index), app.pane_sizes[self.index][1]
-        marks = app.marks(self.index)
-        # Marks are as large as on a plain screen also where a pixel is smaller.
-        corners, colors = overlay.build(marks, camera, round(height / self._zoom))
+        camera, marks = app.framing_camera(self.index), app.marks(self.index)
+        corners, colors = overlay.build(marks, camera, app.plain_height(self.index))
         if len(corners) > self._capacity or self._overlay is None:
             if self._overlay is not None:
                 self._overlay.remove()
@@ -138,7 +135,7 @@ class Pane:
             return
         if self._wires is None:
             self._wires = Wires(self.scene, edges)
-        self._wires.draw(positions, camera, self.app.pane_sizes[self.index][1])
+        self._wires.draw(positions, camera, self.app.plain_height(self.index))
         if not self._wires.whole:
             self.app.touch("faces")
 

@@ -26,7 +26,7 @@ def write_state(path: Path, window: Window) -> None:
         "warm": window.warm,
         "busy": app.worker.busy,
         "script": window.playing_script,
-        "stalls": {kind: [round(one.wall, 4), round(one.own, 4)] for kind, one in window.stalls.longest.items()},
+        "stalls": {kind: asdict(one) for kind, one in window.stalls.longest.items()},
         "playing": app.play.playing,
         "frame": app.play.frame,
         "window": app.play.window,

@@ -22,7 +22,7 @@ class TimeBar:
     def __init__(self, window: Any, app: App, send: Callable[[Event], None]) -> None:
         self._app, self._send = app, send
         self._em = em = window.theme.font_size
-        self._scale = em / 16
+        self._scale = app.density
         self.buttons = gui.Horiz(0.3 * em, gui.Margins(0.5 * em, 0.15 * em, 0.5 * em, 0.15 * em))
         for text, command in (
             ("|<", Command("step", -(10**9))),

@@ -32,6 +32,7 @@ log = logging.getLogger(__name__)
 # Seconds after a change when it is drawn again: a busy renderer leaves frames out, and the last one would be seen
 # only at the next event.
 _AGAIN = (0.05, 0.15, 0.4, 1.0, 2.0)
+_SIZE, _PLAIN_EM = (1500, 920), 16  # of the window and its type, on a plain screen
 _WARM = 20  # ticks in which compiled code is loaded and the first pictures are made
 _TITLE = (0.80, 0.82, 0.86)
 _TONES = {"plain": (0.86, 0.88, 0.91), "good": (0.45, 0.85, 0.52), "bad": (1.0, 0.55, 0.42)}
@@ -43,7 +44,7 @@ class Window:
     def __init__(
         self,
         app: App,
-        size: tuple[int, int] = (1500, 920),
+        size: tuple[int, int] | None = None,
         player: Player | None = None,
         recorder: Recorder | None = None,
         state_file: Path | None = None,
@@ -52,8 +53,12 @@ class Window:
         self.application = gui.Application.instance
         self.application.initialize()
         title = f"Mien: {app.shot.path.resolve().name}"
-        self.window = self.application.create_window(title, *size)
+        self.window = self.application.create_window(title, *(size or _SIZE))
         self._em = self.window.theme.font_size
+        app.density = self._em / _PLAIN_EM
+        if size is None:  # the type is known only now
+            size = (round(_SIZE[0] * app.density), round(_SIZE[1] * app.density))
+            self.window.size = gui.Size(*size)
         self.stalls = StallWatch()
         self._timed_step = self.stalls.timed("tick", self._step)
         self.panes = [Pane(self.window, app, index, self.send) for index in (0, 1)]
@@ -225,7 +230,7 @@ class Window:
         self._legend.visible = field is not None
         if field is not None and self._legend_of != (field.scale, self._places.legend):
             self._legend_of = (field.scale, self._places.legend)
-            self._legend.update_image(image_of(draw_legend(field.scale, self._places.legend.width, self._em / 16)))
+            self._legend.update_image(image_of(draw_legend(field.scale, self._places.legend.width, self.app.density)))
 
     def _draw_panel(self) -> None:
         anew = self.panel.show(self.app.rows())

@@ -29,7 +29,7 @@ class Wires:
         """Whether all edges are in the scene."""
         return _BIT * len(self._bits) >= len(self.edges)
 
-    def draw(self, positions: NDArray[np.float32], camera: Camera, height: int) -> None:
+    def draw(self, positions: NDArray[np.float32], camera: Camera, height: float) -> None:
         """Lay them along the vertices ``positions`` (V, 3), for a pane ``height`` pixels high; add another bit."""
         if not self.whole:
             start = _BIT * len(self._bits)

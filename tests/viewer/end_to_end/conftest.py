@@ -123,12 +123,15 @@ class Desk:
         self._until_told('"release"', lambda: self._xdotool("mouseup", 1))
 
     def _until_told(self, words: str, act: Callable[[], object], patience: float = 3.0) -> bool:
-        """Act, and wait until the viewer has recorded an event with these words: a busy machine takes its time."""
+        """Act, and wait until the viewer has done an event with these words: a busy machine takes its time."""
         before, until = self._told(words), time.monotonic() + patience
         act()
         while self._told(words) == before:
             if time.monotonic() > until:
                 return False
+            time.sleep(0.02)
+        begun = time.time_ns()
+        while self._state_file.stat().st_mtime_ns < begun and time.monotonic() < until:
             time.sleep(0.02)
         return True
 
@@ -152,7 +155,7 @@ class Desk:
         for _ in range(3):  # a press and a release within one picture of a slow renderer are no click for it
             time.sleep(0.5)  # the panel may just be laid out again
             x, y, width, height = self.state["widgets"][name]
-            if self._until_told(f'"name": "{name}"', lambda: self.click(x + width // 2, y + height // 2)):  # noqa: B023
+            if self._until_told(f'"name": "{name}"', lambda: self.click(x + min(width // 2, 12), y + height // 2)):  # noqa: B023
                 return
         raise AssertionError(f"the button {name} cannot be clicked")
 

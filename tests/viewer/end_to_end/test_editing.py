@@ -15,6 +15,7 @@ from toolkit.shot.journal import Journal
 from viewer.picking import Picker
 from viewer.state.cameras import Viewpoint
 from viewer.state.shot_data import ShotData
+from viewer.timeline import Layout
 
 
 def edits(shot: Path) -> tuple:
@@ -53,6 +54,7 @@ def test_a_mouth_corner_is_dragged(shot: Path, sit_down: Callable) -> None:
     desk.wait()
     desk.picture("pose_drag")
     assert edits(shot) == ()
+    window = _drag_the_windows_ends(desk, data)
     desk.key("Return")
     desk.wait(lambda state: len(state["edits"]) == 1)
     desk.picture("pose_committed")
@@ -60,6 +62,7 @@ def test_a_mouth_corner_is_dragged(shot: Path, sit_down: Callable) -> None:
     asked = [c for c in edit.data["constraints"] if c.get("vertex") == corner]
     assert edit.kind == "pose"
     assert [c["frame"] for c in asked] == [frame]
+    assert edit.data["parameters"]["window"] == window
     session = EditSession.open(Shot(shot))
     moved = session.frame(frame)[corner] - session.unedited_frame(frame)[corner]
     assert np.linalg.norm(moved) > 0.01 * data.target_framing.height
@@ -75,6 +78,7 @@ def test_a_mouth_corner_is_dragged(shot: Path, sit_down: Callable) -> None:
     desk.resize(1000, 700)
     state = desk.wait(lambda state: state["size"] == [1000, 700])
     assert state["panes"][1][0] > state["panes"][0][0]
+    _export(desk, shot, data)
     desk.key("question")
     desk.wait()
     assert len(np.unique(desk.picture("resized").reshape(-1, 3), axis=0)) > 1000
@@ -85,6 +89,17 @@ def test_a_mouth_corner_is_dragged(shot: Path, sit_down: Callable) -> None:
     again.picture("reopened")
     again.close()
     assert edits(shot) == (edit,)
+
+
+def _drag_the_windows_ends(desk: Any, data: ShotData) -> list[int]:
+    """Both ends, by their handles; the window then."""
+    left, top, width, height = desk.state["timeline"]
+    layout = Layout(width, height, data.n_frames)
+    first, last = desk.state["window"]
+    y = top + sum(layout.strip) / 2
+    for start, end in ((last, last - 6), (first, first + 1)):
+        desk.drag((left + layout.x(start), y), (left + layout.x(end), y))
+    return desk.wait(lambda state: state["window"] == [first + 1, last - 6])["window"]
 
 
 def _scrub_play_and_turn(desk: Any, data: ShotData) -> None:
@@ -100,6 +115,17 @@ def _scrub_play_and_turn(desk: Any, data: ShotData) -> None:
     x, y, width, height = desk.state["panes"][0]
     desk.drag((x + 20, y + height // 2), (x + 140, y + height // 2 + 30))
     assert desk.wait(lambda state: state["views"][0]["azimuth"] != 0)["views"][0]["azimuth"] < -5
+
+
+def _export(desk: Any, shot: Path, data: ShotData) -> None:
+    desk.key("7")
+    desk.wait(lambda state: "export now" in state["widgets"])
+    desk.button("format:gltf")
+    desk.button("format:npy")
+    desk.button("export now")
+    desk.wait(lambda state: "1 exported" in state["status"])
+    (path,) = (shot / "export").iterdir()
+    np.testing.assert_allclose(np.load(path)[3], EditSession.open(Shot(shot)).frame(3), atol=1e-5)
 
 
 def test_a_kill_in_the_middle_of_a_drag_loses_only_the_drag(shot: Path, sit_down: Callable) -> None:

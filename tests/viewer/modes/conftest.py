@@ -10,6 +10,7 @@ import pytest
 from toolkit.mesh import TriangleMesh
 from toolkit.meshio import write_mesh
 from toolkit.shot import Shot
+from toolkit.shot.journal import Journal
 from toolkit.stages import run_stages
 from viewer.picking import Picker
 from viewer.state.app import App
@@ -18,6 +19,7 @@ from viewer.state.events import Pointer
 from viewer.worker import Worker
 
 SCALE, PLACE = 7.3, np.array([20.0, -5.0, 40.0])
+KEY, MIDDLE = 20, 11 * 31 + 15
 
 
 @pytest.fixture(scope="session")
@@ -127,3 +129,17 @@ def opened(workers: list[Worker]) -> Callable[[Shot], Hand]:
 @pytest.fixture
 def hand(shot: Shot, opened: Callable[[Shot], Hand]) -> Hand:
     return opened(shot)
+
+
+@pytest.fixture
+def pose(hand: Hand) -> Hand:
+    """The hand of a user in the pose edit mode, at the key frame."""
+    hand.app.choose_mode("pose")
+    hand.app.go_to_frame(KEY)
+    hand.wait()
+    return hand
+
+
+def edits(shot: Shot) -> tuple:
+    """What is in the journal."""
+    return Journal(shot.edits_path).replay().edits

@@ -99,6 +99,19 @@ def test_a_landmark_is_dragged_undone_redone_and_deleted(user, raw: Shot) -> Non
     assert pairs(raw) == [(332, 120)]
 
 
+def test_marks_are_taken_hold_of_from_farther_on_a_dense_screen(user, raw: Shot) -> None:
+    app = user.app
+    user.click(300, pane=0)
+    user.click(120, pane=1)
+    x, y = user.pixel_of(300, 0)
+    for density, wanted in ((1.0, -1), (2.0, 0)):
+        app.density = density
+        app.handle(PanelInput("landmark", 0))
+        app.modes["landmarks"].chosen = -1
+        app.modes["landmarks"].press(user.event("press", x + 13, y, 0))
+        assert app.modes["landmarks"].chosen == wanted
+
+
 def test_escape_drops_a_half_pair_and_another_pick_moves_it(user, raw: Shot) -> None:
     user.click(300, pane=0)
     user.click(310, pane=0)

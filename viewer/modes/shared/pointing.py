@@ -40,7 +40,7 @@ def pointed_at(app: App, event: Pointer, places: Sequence[ArrayLike], pixels: fl
     if not len(places):
         return -1
     points = np.asarray(places, dtype=np.float64)
-    camera, height = app.framing_camera(event.pane), app.pane_sizes[event.pane][1]
+    camera, height = app.framing_camera(event.pane), app.plain_height(event.pane)
     away = pixels_from_ray(np.asarray(event.origin), np.asarray(event.direction), points, camera, height)
     if event.hit is not None:
         origin = np.asarray(event.origin)
