@@ -175,6 +175,25 @@ def test_the_window_lies_round_the_frame_and_follows_the_time_line(pose) -> None
     assert mode.draft.parameters.window is None
 
 
+def test_the_reach_of_a_pull_and_what_touches_are_settings(pose) -> None:
+    app, mode = pose.app, pose.app.mode
+    plain = app.surface(1).vertices.copy()
+    pose.click(MIDDLE)
+    app.handle(PanelInput("dz", 0.5))
+    app.handle(PanelInput("settings", True))
+    far = []
+    for percent in (0.0, 2.0):
+        app.handle(PanelInput("reach", percent))
+        pose.wait()
+        moved = np.linalg.norm(app.surface(1).vertices - plain, axis=1)
+        far.append(np.median(moved) / moved[MIDDLE])
+    assert far[1] < 0.5 * far[0]
+    app.handle(PanelInput("contacts", False))
+    assert (mode.draft.parameters.reach, mode.draft.parameters.contacts) == (0.02, 0.0)
+    app.handle(PanelInput("contacts", True))
+    assert mode.draft.parameters.contacts == EditParameters.contacts
+
+
 def test_residuals_are_told_for_every_handle(pose) -> None:
     app, mode = pose.app, pose.app.mode
     at = pose.pixel_of(MIDDLE)

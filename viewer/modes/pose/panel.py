@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.pose_edit import DistanceConstraint, PointConstraint
+from toolkit.pose_edit import DistanceConstraint, EditParameters, PointConstraint
 from viewer.modes.pose.draft import Handle, PoseDraft
 from viewer.state.rows import Button, Check, Choice, Entry, Heading, Items, Note, Number, Row, Slider
 
@@ -95,6 +95,10 @@ def _change_draft(mode: PoseEdit, name: str, value: Any, final: bool) -> None:
         mode.set(draft.changed(**{name: max(float(value), 1e-9)}))
     elif name == "pull":
         mode.set(draft.changed(handle=float(np.clip(float(value) / 100, 0, 0.2))), final)
+    elif name == "reach":
+        mode.set(draft.changed(reach=float(np.clip(float(value) / 100, 0, 1))), final)
+    elif name == "contacts":
+        mode.set(draft.changed(contacts=EditParameters.contacts if value else 0.0))
     elif name == "smoothness":
         mode.set(draft.changed(smoothness=max(float(value), 0.0)))
     elif name == "note":
@@ -157,6 +161,8 @@ def _spread_rows(mode: PoseEdit, draft: PoseDraft) -> list[Row]:
             Number("lambda_w", "keep the motion (lambda w)", parameters.lambda_w, 1e-6, 1e6),
             Number("lambda_e", "meet the points (lambda e)", parameters.lambda_e, 1e-3, 1e9),
             Slider("pull", "pulled disc, % of the face", 100 * parameters.handle, 0.0, 10.0),
+            Slider("reach", "reach, % of the face (0: all)", 100 * parameters.reach, 0.0, 50.0),
+            Check("contacts", "what touches stays shut", parameters.contacts > 0),
             Number("smoothness", "smooth over frames", parameters.smoothness, 0.0, 200.0),
         ]
     return rows
