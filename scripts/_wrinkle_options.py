@@ -52,7 +52,7 @@ def add_region_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--hardness", type=float, default=0.5, metavar="H", help="share of D where it is full (0.5)")
     group.add_argument("--grow", metavar="D", help="then larger by D ...")
     group.add_argument("--shrink", metavar="D", help="... or smaller")
-    group.add_argument("--other-side", action="store_true", help="and the same on the other side of the face instead")
+    group.add_argument("--other-side", action="store_true", help="the same place on the other side of the face instead")
 
 
 def region_of(options: argparse.Namespace, session: EditSession) -> Region | None:
