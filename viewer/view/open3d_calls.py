@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
+from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import open3d as o3d
@@ -28,6 +30,9 @@ __all__ = [
 _RING = 3
 """Buffers in turn: Open3D reads the arrays after the call, in its own thread, and takes no copy."""
 
+_LINGER = 10.0
+"""Seconds for which buffers outlive their mesh: that thread may not have come to them when the mesh is removed."""
+
 
 class DynamicMesh:
     """A mesh in a scene whose positions and colours are replaced, never the mesh: each adding leaks, and 65,536 kill.
@@ -38,6 +43,8 @@ class DynamicMesh:
     name : its name there
     triangles : (F, 3) of ``n_vertices``
     """
+
+    _removed: ClassVar[deque[tuple[float, DynamicMesh]]] = deque()
 
     def __init__(
         self,
@@ -73,6 +80,10 @@ class DynamicMesh:
     def remove(self) -> None:
         """Take it out of the scene."""
         self._scene.remove_geometry(self.name)
+        now = time.monotonic()
+        while self._removed and self._removed[0][0] < now - _LINGER:
+            self._removed.popleft()
+        self._removed.append((now, self))
 
 
 def new_scene(window: Any) -> tuple[Any, Any]:

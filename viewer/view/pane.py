@@ -21,6 +21,8 @@ __all__ = ["Pane"]
 
 _IVORY = np.array([[0.86, 0.85, 0.82]], np.float32)
 _LABELS = 96
+_USUAL_MARKS = 4096
+"""Triangles of marks that are made room for at once: a mesh that replaces a smaller one costs a blink of the window."""
 
 
 class Pane:
@@ -90,7 +92,7 @@ class Pane:
         if len(corners) > self._capacity or self._overlay is None:
             if self._overlay is not None:
                 self._overlay.remove()
-            triangles = max(512, 2 * len(corners) // overlay.CORNERS)
+            triangles = max(_USUAL_MARKS, 2 * len(corners) // overlay.CORNERS)
             self._capacity = triangles * overlay.CORNERS
             self._overlay = self._mesh(f"overlay {self._capacity}", overlay.triangles_for(triangles), self._capacity)
         to_positions, to_colors = self._overlay.next_buffers()
