@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import logging
 import os
 import sys
@@ -55,7 +56,11 @@ def _show(options: argparse.Namespace, probe: object) -> int:
         probe.check()  # type: ignore[attr-defined]
         from viewer.view.window import Window
 
-        Window(app, options.size, player, recorder, options.state).run()
+        window = Window(app, options.size, player, recorder, options.state)
+        # A search for garbage through all that the libraries brought holds the window for a fifth of a second.
+        gc.collect()
+        gc.freeze()
+        window.run()
     finally:
         worker.stop()
     return 0
