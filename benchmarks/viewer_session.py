@@ -5,8 +5,8 @@
 
 Every call of the window's main loop is measured: pointer, keys, panel, and the ticks, in which all is drawn. Issue 5
 asks for at most 0.1 s. "loop" is what Open3D does between the calls, its renderer (here in software) included. The
-clock also runs while other programs have the processor; the second figure is without that
-time, and the third without waiting for locks and disks either.
+clock also runs while other programs have the processor; the second figure is without that time, and the third without
+waiting for locks and disks either.
 """
 
 from __future__ import annotations

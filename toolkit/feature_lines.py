@@ -14,12 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
 
 from toolkit.errors import InputError
-from toolkit.mesh.topology import unique_edges
+from toolkit.mesh import edge_graph, unique_edges
 from toolkit.meshio.aside import written_aside
 
 __all__ = [
@@ -89,12 +88,8 @@ class EdgePaths:
     def __init__(self, vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> None:
         self.edges = unique_edges(triangles)
         self._vertices = vertices
-        n = len(vertices)
-        self._keys = self.edges[:, 0] * n + self.edges[:, 1]
-        lengths = np.linalg.norm(vertices[self.edges[:, 0]] - vertices[self.edges[:, 1]], axis=1)
-        both = np.concatenate([self.edges, self.edges[:, ::-1]])
-        # Both ways: of an undirected graph the search would make a transposed copy each time.
-        self._graph = sp.csr_matrix((np.tile(np.maximum(lengths, 1e-300), 2), both.T), shape=(n, n))
+        self._keys = self.edges[:, 0] * len(vertices) + self.edges[:, 1]
+        self._graph = edge_graph(vertices, self.edges)
 
     def through(self, picks: Sequence[int] | Ids, closed: bool) -> Ids:
         """As `shortest_edge_path`."""

@@ -12,7 +12,6 @@ from toolkit.solve import factorise
 
 __all__ = ["bent_along"]
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Ids = NDArray[np.int64]
 

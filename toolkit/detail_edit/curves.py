@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
 
 from toolkit.detail_edit.ground import Ground
 from toolkit.detail_edit.surface import Curve, Surface, SurfacePoint, as_curve
 from toolkit.errors import InputError
+from toolkit.mesh import edge_graph
 
 __all__ = ["drawn", "snapped"]
 
@@ -54,11 +54,7 @@ class _Ways:
 
     def __init__(self, surface: Surface) -> None:
         self._surface = surface
-        i, j = surface.edges.T
-        lengths = np.linalg.norm(surface.vertices[i] - surface.vertices[j], axis=1)
-        n = surface.n_vertices
-        both = (np.concatenate([i, j]), np.concatenate([j, i]))
-        self._graph = sp.csr_matrix((np.tile(lengths, 2), both), shape=(n, n))
+        self._graph = edge_graph(surface.vertices, surface.edges)
 
     def tight(self, start: SurfacePoint, end: SurfacePoint) -> Curve:
         """The shortest curve on the surface between two points."""

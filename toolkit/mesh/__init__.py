@@ -2,6 +2,7 @@
 
 from toolkit.mesh.core import Polygons, TriangleMesh
 from toolkit.mesh.geometry import (
+    edge_graph,
     face_normals,
     local_frames,
     triangle_areas,
@@ -22,6 +23,7 @@ __all__ = [
     "boundary_edges",
     "boundary_vertices",
     "connected_components",
+    "edge_graph",
     "face_normals",
     "local_frames",
     "triangle_areas",

@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
-__all__ = ["face_normals", "local_frames", "triangle_areas", "vertex_areas", "vertex_normals"]
+__all__ = ["edge_graph", "face_normals", "local_frames", "triangle_areas", "vertex_areas", "vertex_normals"]
 
 Array = NDArray[np.float64]
 _TINY = 1e-30
+
+
+def edge_graph(vertices: NDArray[np.floating], edges: NDArray[np.integer]) -> sp.csr_matrix:
+    """Lengths of the edges (E, 2), each given once, as a graph for shortest paths, ``(V, V)``.
+
+    Both ways, since SciPy transposes a graph anew for every search along edges that are given one way.
+    """
+    lengths = np.maximum(np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1), 1e-300)
+    both = np.concatenate([edges, edges[:, ::-1]])
+    return sp.csr_matrix((np.tile(lengths, 2), (both[:, 0], both[:, 1])), shape=(len(vertices), len(vertices)))
 
 
 def face_normals(vertices: Array, triangles: NDArray[np.integer], *, unit: bool = True) -> Array:

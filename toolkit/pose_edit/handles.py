@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 class Handles:
-    """Pulls on discs of a ``radius`` in mesh units, measured along the edges of the mesh (`regions.edge_lengths`).
+    """Pulls on discs of a ``radius`` in mesh units, measured along the edges of the mesh (`toolkit.mesh.edge_graph`).
 
     Along the edges, so that a pull on the upper lip does not take hold of the lower one.
     """

@@ -10,28 +10,17 @@ from scipy.spatial import cKDTree
 
 from toolkit.errors import InputError
 
-__all__ = ["edge_lengths", "vertices_beyond"]
+__all__ = ["vertices_beyond"]
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
 
 
-def edge_lengths(vertices: Array, edges: NDArray[np.integer]) -> sp.csr_matrix:
-    """The mesh as a graph: lengths of its edges (E, 2), each given once here and twice in the result, ``(V, V)``.
-
-    Both ways, since SciPy transposes a graph anew for every path along edges that are given one way.
-    """
-    apart = vertices[edges[:, 0]] - vertices[edges[:, 1]]
-    length = np.maximum(np.sqrt(np.sum(apart**2, axis=1)), 1e-30)
-    ends = np.concatenate([edges, edges[:, ::-1]])
-    return sp.csr_matrix((np.tile(length, 2), (ends[:, 0], ends[:, 1])), shape=(len(vertices), len(vertices)))
-
-
 def vertices_beyond(vertices: Array, graph: sp.csr_matrix, start: NDArray[np.integer], distance: float) -> Ids:
     """Vertices farther than ``distance`` from the ``start`` vertices, sorted.
 
-    Along the edges of the mesh (`edge_lengths`), so that the upper lip is far from the lower one; parts that no edges
-    join to the start, as eyes and teeth, as the crow flies.
+    Along the edges of the mesh (`toolkit.mesh.edge_graph`), so that the upper lip is far from the lower one; parts that
+    no edges join to the start, as eyes and teeth, as the crow flies.
     """
     start = np.unique(np.asarray(start, dtype=np.int64))
     if not len(start):

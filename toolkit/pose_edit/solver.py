@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from toolkit.errors import InputError
-from toolkit.mesh.topology import unique_edges
+from toolkit.mesh import edge_graph, unique_edges
 from toolkit.pose_edit.bases_step import Responses
 from toolkit.pose_edit.constraints import (
     BeyondConstraint,
@@ -25,7 +25,7 @@ from toolkit.pose_edit.constraints import (
 from toolkit.pose_edit.handles import Handles
 from toolkit.pose_edit.parameters import EditParameters
 from toolkit.pose_edit.problem import EditProblem, EditState, solve_in_rounds
-from toolkit.pose_edit.regions import edge_lengths, vertices_beyond
+from toolkit.pose_edit.regions import vertices_beyond
 from toolkit.pose_edit.result import PoseEdit, Residual
 from toolkit.pose_edit.take import EditableTake, LowRankMoves
 from toolkit.pose_edit.weights_step import WeightsProblem, time_matrix
@@ -50,7 +50,7 @@ class PoseEditor:
 
     def __init__(self, take: EditableTake, triangles: NDArray[np.integer]) -> None:
         self.take = take
-        self._graph = edge_lengths(take.rest, unique_edges(triangles))
+        self._graph = edge_graph(take.rest, unique_edges(triangles))
         self._edge = float(np.median(self._graph.data))
         self._reach = _reach(take)
         self._n_triangles = np.bincount(np.asarray(triangles).ravel(), minlength=take.n_vertices)

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
 
 from toolkit.feature_lines import FeatureLine, find_openings, shortest_edge_path, trace_lines
-from toolkit.mesh import TriangleMesh, unique_edges
+from toolkit.mesh import TriangleMesh, edge_graph, unique_edges
 
 __all__ = [
     "Curve",
@@ -137,11 +136,8 @@ def voted_labels(mesh: TriangleMesh, skin: NDArray[np.bool_], upper: Ids, lower:
 def _nearer(mesh: TriangleMesh, skin: NDArray[np.bool_], upper: Ids, lower: Ids, reach: float) -> NDArray[np.int8]:
     edges = unique_edges(mesh.triangles)
     edges = edges[skin[edges].all(axis=1)]
-    lengths = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
-    graph = sp.csr_matrix((np.maximum(lengths, 1e-300), (edges[:, 0], edges[:, 1])), shape=(len(skin), len(skin)))
-    above, below = (
-        dijkstra(graph, directed=False, indices=ids, limit=_STEADY * reach, min_only=True) for ids in (upper, lower)
-    )
+    graph = edge_graph(mesh.vertices, edges)
+    above, below = (dijkstra(graph, indices=ids, limit=_STEADY * reach, min_only=True) for ids in (upper, lower))
     near = np.minimum(above, below) < reach
     sides = np.where(above * _STEADY < below, 1, np.where(below * _STEADY < above, -1, 0))
     return np.where(near, sides, 0).astype(np.int8)

@@ -23,7 +23,6 @@ from toolkit.stages.register import load_pose
 
 __all__ = ["ShotViews", "expressive_frames", "open_views"]
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 

@@ -159,7 +159,6 @@ _NAMED = {
     "PERIOD": ".",
 }
 _DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
-_SHIFTS = ("LEFT_SHIFT", "RIGHT_SHIFT", "LEFT_CONTROL", "RIGHT_CONTROL", "ALT")
 _HELD = {"LEFT_SHIFT": "shift", "RIGHT_SHIFT": "shift", "LEFT_CONTROL": "ctrl", "RIGHT_CONTROL": "ctrl", "ALT": "alt"}
 
 

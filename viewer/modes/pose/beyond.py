@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
 
-from toolkit.mesh.topology import unique_edges
+from toolkit.mesh import edge_graph, unique_edges
 from toolkit.pose_edit.constraints import handled_vertices
-from toolkit.pose_edit.regions import edge_lengths
 from toolkit.progress import Progress
 from viewer.modes.pose.draft import PoseDraft
 
@@ -45,8 +44,8 @@ class Beyond:
             rest = session.rest
             graph = self._graph
             if graph is None:
-                graph = edge_lengths(rest, unique_edges(session.triangles))
-            along = dijkstra(graph, directed=False, indices=list(vertices), min_only=True)
+                graph = edge_graph(rest, unique_edges(session.triangles))
+            along = dijkstra(graph, indices=list(vertices), min_only=True)
             return graph, along.astype(np.float32)
 
         def done(found: tuple[Any, NDArray[np.float32]]) -> None:
