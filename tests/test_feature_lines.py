@@ -98,6 +98,31 @@ def test_openings_from_arcs_and_from_rings() -> None:
     assert set(eye.upper) | set(eye.lower) == set(range(20))
 
 
+def test_guides_hold_no_edges_and_are_no_rims() -> None:
+    rim = FeatureLine("lid", True, np.array([0, 1, 2, 3]))
+    guides = [
+        FeatureLine(f"midline_{side}", False, np.array([k, k + 4]), guide=True)
+        for k, side in enumerate(("upper", "lower"))
+    ]
+    guides.append(FeatureLine("outline of the mouth", True, np.array([5, 6, 7]), guide=True))
+    vertices = np.arange(27, dtype=float).reshape(9, 3)
+    assert line_edges([rim, *guides]).tolist() == line_edges([rim]).tolist()
+    assert line_edges(guides).shape == (0, 2)
+    assert [opening.name for opening in find_openings([*guides, rim], vertices)] == ["lid"]
+
+
+def test_guides_stay_guides(tmp_path: Path, bump: TriangleMesh) -> None:
+    path = tmp_path / "feature_lines.json"
+    picked = FeatureLine("jaw", False, np.array([40, 700]), np.array([3, 9]), guide=True)
+    save_feature_lines(path, [picked, FeatureLine("lid", True, np.array([4, 2, 8]))])
+    jaw, lid = load_feature_lines(path)
+    assert (jaw.guide, lid.guide) == (True, False)
+    (traced,) = trace_lines([jaw], bump.vertices, bump.triangles)
+    assert traced.guide
+    assert traced.target_vertices is not None
+    assert len(traced.vertices) > 2
+
+
 def test_file_round_trip_and_bad_files(tmp_path: Path) -> None:
     path = tmp_path / "feature_lines.json"
     save_feature_lines(path, [FeatureLine("lip", True, np.array([4, 2, 8]), np.array([1, 0]))])
@@ -111,7 +136,8 @@ def test_file_round_trip_and_bad_files(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="target vertex 1"):
         load_feature_lines(path, 9, 1)
     line = {"name": "lip", "closed": "no", "vertices": [1, 2]}
-    for content in ({"curves": []}, {"lines": [7]}, {"lines": [line]}):
+    maybe = {"name": "lip", "closed": False, "guide": "yes", "vertices": [1, 2]}
+    for content in ({"curves": []}, {"lines": [7]}, {"lines": [line]}, {"lines": [maybe]}):
         path.write_text(json.dumps(content))
         with pytest.raises(InputError, match="no feature-line file"):
             load_feature_lines(path)

@@ -1,7 +1,8 @@
 """Feature lines round eyes and mouth: connected edges on the source's topology, drawn from a few picked vertices.
 
 A line may also carry the matching line on the target's own mesh, which the registration uses, and two lines may be the
-two sides of an opening (upper and lower lid, upper and lower lip), which the contacts use.
+two sides of an opening (upper and lower lid, upper and lower lip), which the contacts use. A guide is a line that only
+the registration uses: along brows, nose and jaw, where the transfer should not hold edges.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -46,13 +47,14 @@ class FeatureLine:
     """One line: ``vertices`` (n,) source vertex ids in order, ``closed`` if the last joins the first.
 
     ``target_vertices`` (m,) the same line on the target's own mesh, if the user gave it; its number of vertices and its
-    starting point may differ.
+    starting point may differ. ``guide``: only the registration uses it, neither transfer nor contacts.
     """
 
     name: str
     closed: bool
     vertices: Ids
     target_vertices: Ids | None = None
+    guide: bool = False
 
     def edges(self) -> Ids:
         """Its consecutive pairs of vertices, ``(n, 2)`` closed or ``(n - 1, 2)`` open."""
@@ -146,25 +148,24 @@ def trace_lines(
     return [
         line
         if paths.joins(line.vertices, line.closed)
-        else FeatureLine(line.name, line.closed, paths.through(line.vertices, line.closed), line.target_vertices)
+        else replace(line, vertices=paths.through(line.vertices, line.closed))
         for line in lines
     ]
 
 
 def line_edges(lines: Sequence[FeatureLine]) -> Ids:
-    """All edges of all lines, each once, ``(E, 2)``, lower id first."""
-    if not lines:
-        return np.zeros((0, 2), dtype=np.int64)
-    return np.unique(np.sort(np.concatenate([line.edges() for line in lines]), axis=1), axis=0)
+    """All edges of all lines but the guides, each once, ``(E, 2)``, lower id first."""
+    edges = [np.zeros((0, 2), dtype=np.int64)] + [line.edges() for line in lines if not line.guide]
+    return np.unique(np.sort(np.concatenate(edges), axis=1), axis=0)
 
 
 def find_openings(lines: Sequence[FeatureLine], vertices: NDArray[np.float64]) -> list[Opening]:
     """The openings whose sides can touch.
 
     Two open lines called ``..._upper`` and ``..._lower`` are the sides of one; otherwise a closed line round a lid or
-    an inner lip is split at its corners, the two vertices of it that are farthest apart.
+    an inner lip is split at its corners, the two vertices of it that are farthest apart. Guides are no sides.
     """
-    named = {line.name: line for line in lines}
+    named = {line.name: line for line in lines if not line.guide}
     openings = []
     covered: set[int] = set()
     for name, line in named.items():
@@ -178,7 +179,7 @@ def find_openings(lines: Sequence[FeatureLine], vertices: NDArray[np.float64]) -
             lower = lower[::-1]
         openings.append(Opening(name.replace("_upper", "").replace("upper_", ""), upper, lower))
         covered.update(upper.tolist(), lower.tolist())
-    for line in lines:
+    for line in named.values():
         is_rim = any(word in line.name for word in _OPENING_WORDS) and "outer" not in line.name
         if not line.closed or not is_rim or len(covered.intersection(line.vertices.tolist())) > 2:
             continue
@@ -198,7 +199,7 @@ def _split_at_corners(line: FeatureLine, vertices: NDArray[np.float64]) -> Openi
 
 
 def load_feature_lines(path: str | Path, n_source: int | None = None, n_target: int | None = None) -> list[FeatureLine]:
-    """Read ``{"lines": [{"name", "closed", "vertices", "target_vertices"?}]}`` (0-based ids)."""
+    """Read ``{"lines": [{"name", "closed", "vertices", "target_vertices"?, "guide"?}]}`` (0-based ids)."""
     try:
         data = json.loads(Path(path).read_text(encoding="utf-8"))
         entries = data["lines"]
@@ -219,14 +220,18 @@ def load_feature_lines(path: str | Path, n_source: int | None = None, n_target: 
 
 
 def _line_from(entry: dict[str, Any]) -> FeatureLine:
-    if not isinstance(entry, dict) or not isinstance(entry["closed"], bool):
-        raise ValueError(f"{entry} is no line, or its closed is neither true nor false")
+    if not isinstance(entry, dict):
+        raise ValueError(f"{entry} is no line")
+    flags = {"closed": entry["closed"], "guide": entry.get("guide", False)}
+    for key, value in flags.items():
+        if not isinstance(value, bool):
+            raise ValueError(f"{key} of the line {entry['name']!r} is {value!r}, neither true nor false")
     target = entry.get("target_vertices")
     return FeatureLine(
-        str(entry["name"]),
-        entry["closed"],
-        np.asarray(entry["vertices"], dtype=np.int64).reshape(-1),
-        None if target is None else np.asarray(target, dtype=np.int64).reshape(-1),
+        name=str(entry["name"]),
+        vertices=np.asarray(entry["vertices"], dtype=np.int64).reshape(-1),
+        target_vertices=None if target is None else np.asarray(target, dtype=np.int64).reshape(-1),
+        **flags,
     )
 
 
@@ -251,6 +256,8 @@ def save_feature_lines(path: str | Path, lines: Sequence[FeatureLine]) -> None:
         entry: dict[str, Any] = {"name": line.name, "closed": line.closed, "vertices": line.vertices.tolist()}
         if line.target_vertices is not None:
             entry["target_vertices"] = line.target_vertices.tolist()
+        if line.guide:
+            entry["guide"] = True
         entries.append(entry)
     text = json.dumps({"lines": entries}, indent=1)
     with written_aside(path) as temporary:

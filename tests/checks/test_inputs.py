@@ -55,6 +55,15 @@ def test_landmarks_follow_a_target_that_is_repaired(inputs, caplog):
     assert "inside out" not in caplog.text
 
 
+def test_a_guide_on_one_face_only_is_told(inputs):
+    drawn = FeatureLine("jaw", False, np.array([3, 9]), np.array([4, 10]), guide=True)
+    lines = [drawn, replace(drawn, name="brow", target_vertices=None), FeatureLine("lip", False, np.array([1, 2]))]
+    findings = check_inputs(**{**inputs, "lines": lines}).findings
+    (finding,) = (f for f in findings if "guide" in f.what)
+    assert (finding.severity, finding.index) == ("warning", 1)
+    assert "guide 'brow' is not drawn on the target" in finding.sentence
+
+
 def test_a_landmark_that_only_a_broken_face_holds_is_refused(inputs):
     target = inputs["target"]
     n = target.n_vertices

@@ -88,6 +88,7 @@ def check_inputs(
     judge(check_landmarks(names, source_ids, target_ids, source, target, places.landmarks))
     judge(check_feature_lines(lines, source, places.feature_lines))
     judge(check_feature_lines(on_target, target, f"{places.feature_lines} (target)"))
+    judge(_idle_guides(lines, places))
     judge(check_scale(source.vertices[np.asarray(source_ids)], target.vertices[np.asarray(target_ids)], places.target))
     good_source, good_target = repair_source(source, places.source), repair_target(target, places.target)
     moved = good_target.vertex_map
@@ -105,6 +106,21 @@ def check_inputs(
         tuple(said),
         good_source.notes + good_target.notes,
     )
+
+
+def _idle_guides(lines: Sequence[FeatureLine], places: Places) -> list[Finding]:
+    """Guides that are on one face only: nothing uses them."""
+    return [
+        Finding(
+            "warning",
+            f"guide '{line.name}' is not drawn on the target, so nothing uses it",
+            places.feature_lines,
+            index,
+            "draw it there, or delete it",
+        )
+        for index, line in enumerate(lines)
+        if line.guide and line.target_vertices is None
+    ]
 
 
 def _lost_picks(

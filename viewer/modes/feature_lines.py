@@ -89,6 +89,7 @@ class FeatureLineMode(Mode):
         ]
         if known and not drawing:
             rows.append(Check("line closed", "closed", self._lines[self.chosen].closed))
+            rows.append(Check("line guide", "a guide: for the registration only", self._lines[self.chosen].guide))
         rows.append(Note("lid, lip, mouth or eye in the name: the rim of an opening (not with outer)", "quiet"))
         return rows
 
@@ -182,6 +183,8 @@ class FeatureLineMode(Mode):
             self._delete()
         elif name == "line closed" and 0 <= self.chosen < len(self._lines):
             self._set(_with(self._lines, self.chosen, replace(self._lines[self.chosen], closed=bool(value))))
+        elif name == "line guide" and 0 <= self.chosen < len(self._lines):
+            self._set(_with(self._lines, self.chosen, replace(self._lines[self.chosen], guide=bool(value))))
         elif name == "line save":
             self._save()
             self.app.say(f"{len(self._lines)} lines are in {self.app.shot.feature_lines_path}", "good")
@@ -321,11 +324,11 @@ def _path_through(paths: EdgePaths, picks: tuple[int, ...], closed: bool) -> Ids
 
 def _key(line: FeatureLine) -> tuple[Any, ...]:
     target = None if line.target_vertices is None else tuple(line.target_vertices.tolist())
-    return line.name, line.closed, tuple(line.vertices.tolist()), target
+    return line.name, line.closed, line.guide, tuple(line.vertices.tolist()), target
 
 
 def _in_words(line: FeatureLine) -> str:
-    shape = "closed" if line.closed else "open"
+    shape = ("closed" if line.closed else "open") + (", a guide" if line.guide else "")
     target = "" if line.target_vertices is None else ", on the target too"
     return f"{line.name}   {len(line.vertices)} vertices, {shape}{target}"
 

@@ -179,6 +179,11 @@ def test_the_targets_side_of_a_line_and_leaving_in_the_middle(user, raw: Shot) -
     (line,) = load_feature_lines(raw.feature_lines_path)
     assert line.target_vertices is not None
     assert [last - v for v in line.target_vertices.tolist()][:: len(line.target_vertices) - 1] == [163, 176]
+    assert not line.guide
+    app.handle(PanelInput("line guide", True))
+    (line,) = load_feature_lines(raw.feature_lines_path)
+    assert line.guide
+    assert line.target_vertices is not None
     app.handle(Key("delete"))
     assert load_feature_lines(raw.feature_lines_path) == []
 
