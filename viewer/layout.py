@@ -33,6 +33,10 @@ class Rectangle:
         """Where it ends."""
         return self.y + self.height
 
+    def middle(self, width: int, height: int) -> Rectangle:
+        """A smaller one in its middle."""
+        return Rectangle(self.x + (self.width - width) // 2, self.y + (self.height - height) // 2, width, height)
+
     @property
     def size(self) -> tuple[int, int]:
         """Width and height."""
@@ -41,11 +45,15 @@ class Rectangle:
 
 @dataclass(frozen=True)
 class Places:
-    """Of the two panes and their titles, the colour map's legend, the panel, the time line, and the bottom line."""
+    """Of the two panes and their titles, the colour map's legend, the panel, the time line, and the bottom line.
+
+    ``help`` is where the card of keys finds room: over the panes, never over what plays the take.
+    """
 
     panes: tuple[Rectangle, Rectangle]
     titles: tuple[Rectangle, Rectangle]
     legend: Rectangle
+    help: Rectangle
     panel: Rectangle
     buttons: Rectangle
     times: Rectangle
@@ -69,6 +77,7 @@ def arrange(whole: Rectangle, em: float) -> Places:
         (left, right),
         (_title(left, em), _title(right, em)),
         _legend(right, em),
+        Rectangle(whole.x, whole.y, width, height),
         Rectangle(whole.x + width, whole.y, side, max(whole.height - status, height)),
         Rectangle(whole.x, low, width, buttons),
         Rectangle(whole.x, low + buttons, width, times),

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.help_card import Group
 from viewer.state.fields import MAPS
 from viewer.state.panes import PAIRS
 from viewer.state.rows import Button, Buttons, Choice, Heading, Note, Row, Slider
@@ -14,7 +15,7 @@ from viewer.timeline import Timeline
 if TYPE_CHECKING:
     from viewer.state.app import App
 
-__all__ = ["help_lines", "panel_rows", "status_line", "timeline_of"]
+__all__ = ["help_groups", "panel_rows", "status_line", "timeline_of"]
 
 _MODES_IN_A_ROW = 4
 
@@ -142,26 +143,28 @@ def timeline_of(app: App) -> Timeline:
     )
 
 
-def help_lines(app: App) -> list[tuple[str, str]]:
-    """Every key and what it does."""
-    lines = [
-        ("space", "play or pause"),
-        ("left, right", "a frame back or on (shift: ten)"),
-        ("home, end", "first or last frame"),
-        ("z, shift-z", "undo, redo"),
-        ("f", "frame the face"),
-        ("v", "next pair of views"),
-        ("w", "wireframe"),
-        ("l", "link the views, or not"),
-    ]
-    lines += [(str(index), mode.title) for index, mode in enumerate(app.modes.values(), start=1)]
-    lines += list(app.mode.keys())
-    lines += [
-        ("left drag", "turn the view (where the mode does not need it; alt: always)"),
-        ("right drag, wheel", "pan, zoom"),
-        ("ctrl-right drag", "turn the light"),
-        ("esc", "cancel what is running, or close this"),
-        ("ctrl-q", "quit"),
-        ("?", "these keys"),
-    ]
-    return lines
+def help_groups(app: App) -> list[Group]:
+    """Every key and what it does; those of the present mode first."""
+    own = [Group(app.mode.title, app.mode.keys())] if app.mode.keys() else []
+    modes = (f"1 to {len(app.modes)}", "the modes, as they are numbered")
+    return [*own, Group("Pointer", _POINTER), Group("Everywhere", (modes, *_KEYS))]
+
+
+_POINTER = (
+    ("left drag", "turn the view; with alt in every tool"),
+    ("right drag, wheel", "pan, zoom"),
+    ("ctrl-right drag", "turn the light"),
+)
+_KEYS = (
+    ("space", "play or pause"),
+    ("left, right", "a frame back or on (shift: ten)"),
+    ("home, end", "first or last frame"),
+    ("z, shift-z", "undo, redo"),
+    ("f", "frame the face"),
+    ("v, shift-v", "next or last pair of views"),
+    ("w", "wireframe"),
+    ("l", "link the views, or not"),
+    ("esc", "cancel what is running, or close this"),
+    ("ctrl-q", "quit"),
+    ("?", "these keys"),
+)

@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from viewer.help_card import draw_help
 from viewer.layout import PANEL, Rectangle, arrange
 from viewer.legend import draw_legend
 from viewer.script import Player, Recorder
 from viewer.stalls import StallWatch
 from viewer.state.app import App
 from viewer.state.events import Event, Key
-from viewer.state.look import help_lines
+from viewer.state.look import help_groups
 from viewer.view import open3d_calls as native
 from viewer.view.open3d_calls import gui, image_of
 from viewer.view.pane import Pane
@@ -74,8 +75,8 @@ class Window:
         self._legend = gui.ImageWidget()
         self._legend_of: Any = None
         self._places = arrange(Rectangle(0, 0, *size), self._em)
-        self._help = gui.Vert(0, gui.Margins(1.2 * self._em, 0.8 * self._em, 1.2 * self._em, 0.8 * self._em))
-        self._help_proxy = gui.WidgetProxy()
+        self._help = gui.ImageWidget()
+        self._help_of: Any = None
         self._build()
         self._held: set[str] = set()
         self._last = time.monotonic()
@@ -129,8 +130,6 @@ class Window:
         for pane in self.panes:
             pane.widget.set_on_mouse(self.stalls.timed("pointer", pane.mouse))
             self.window.add_child(pane.widget)
-        self._help.add_child(self._help_proxy)
-        self._help.background_color = gui.Color(0.08, 0.085, 0.1, 0.96)
         self._help.visible = self._legend.visible = self._progress.visible = False
         for label in self._titles:
             label.text_color = gui.Color(*_TITLE)
@@ -157,9 +156,6 @@ class Window:
             (self._progress, places.progress), (self._legend, places.legend),
         ):  # fmt: skip
             widget.frame = native.rectangle(place)
-        need = self._help.calc_preferred_size(context, gui.Widget.Constraints())
-        margin = int(1.6 * self._em)
-        self._help.frame = gui.Rect(whole.x + margin, whole.y + margin, need.width, need.height)
         self._settle, self._stale = 3, True
         self.app.touch("camera", "faces", "overlay", "timeline")
 
@@ -222,6 +218,7 @@ class Window:
             self._draw_panel()
         if changes & {"status", "panel", "timeline"}:
             self._draw_status()
+        self._draw_help()
 
     def _draw_titles(self) -> None:
         for label, words in zip(self._titles, self.app.pair.titles, strict=True):
@@ -234,11 +231,6 @@ class Window:
 
     def _draw_panel(self) -> None:
         anew = self.panel.show(self.app.rows())
-        if self._help.visible != self.app.help_shown:
-            self._help.visible = self.app.help_shown
-            if self.app.help_shown:
-                self._help_proxy.set_widget(self._help_widget())
-            anew = True
         if anew:
             self.window.set_needs_layout()
 
@@ -250,14 +242,15 @@ class Window:
         if progress is not None:
             self._progress.value = progress[1] / progress[2] if progress[2] else 0.0
 
-    def _help_widget(self) -> Any:
-        grid = gui.VGrid(2, 0.25 * self._em)
-        for key, words in help_lines(self.app):
-            label = gui.Label(key)
-            label.text_color = gui.Color(1.0, 0.80, 0.40)
-            grid.add_child(label)
-            grid.add_child(gui.Label(words))
-        return grid
+    def _draw_help(self) -> None:
+        """Over both panes, in their middle."""
+        self._help.visible = self.app.help_shown
+        wanted = (self.app.mode, self._places.help)
+        if self.app.help_shown and self._help_of != wanted:
+            self._help_of, room = wanted, self._places.help
+            card = draw_help(help_groups(self.app), room.size, self.app.density)
+            self._help.update_image(image_of(card))
+            self._help.frame = native.rectangle(room.middle(card.shape[1], card.shape[0]))
 
     # -- keys and the end -----------------------------------------------------------------------------------------
 
