@@ -29,7 +29,6 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from benchmarks._scale.runs import write_shot  # noqa: E402
-from benchmarks._scale.takes import performer_at  # noqa: E402
 from toolkit.detail_edit import Region, ScaleEdit  # noqa: E402
 from toolkit.editing import EditSession  # noqa: E402
 from toolkit.pose_edit import EditParameters, PointConstraint  # noqa: E402
@@ -129,7 +128,7 @@ def main() -> int:
         work = Path(folder)
         if not options.no_section6:
             said["section6"] = _section_6(
-                _opened(work / "shot", options.vertices, options.frames, options.bases), options
+                _opened(work / "shot", options.vertices, options.frames, options.bases, options.takes), options
             )
         if options.table2:
             said["table2"] = _table_2(work, options)
@@ -185,7 +184,7 @@ def _table_2(work: Path, options: argparse.Namespace) -> list[dict[str, Any]]:
         row = TABLE_2[number - 1]
         vertices = max(round(row.vertices * options.share), 4_326)
         frames = max(round(row.frames * options.share), row.bases + 2)
-        session = _opened(work / f"row{number}", vertices, frames, row.bases)
+        session = _opened(work / f"row{number}", vertices, frames, row.bases, options.takes)
         face = Face(session, options.points, min(options.region, vertices), min(options.window, frames))
         session.frame(0)
         began = time.perf_counter()
@@ -207,10 +206,10 @@ def _table_2(work: Path, options: argparse.Namespace) -> list[dict[str, Any]]:
     return said
 
 
-def _opened(folder: Path, vertices: int, frames: int, bases: int) -> EditSession:
+def _opened(folder: Path, vertices: int, frames: int, bases: int, takes: Path | None) -> EditSession:
     """A session on a fresh shot of the sample performer."""
     folder.mkdir()
-    write_shot(folder, performer_at(vertices), frames, bases)
+    write_shot(folder, vertices, frames, bases, takes)
     shot = Shot(folder)
     run_stages(shot, ["transfer"])
     return EditSession.open(shot)
@@ -246,6 +245,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--share", type=float, default=1.0, help="share of Table 2's vertices and frames to run (1)")
     parser.add_argument("--no-section6", action="store_true", help="only Table 2")
     parser.add_argument("--work", type=Path, help="where to put the shots; 6 GiB by default")
+    parser.add_argument("--takes", type=Path, metavar="DIR", help="keep the takes here, for the next time")
     parser.add_argument("--json", action="store_true", help="end with one line of JSON")
     return parser
 

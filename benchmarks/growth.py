@@ -23,7 +23,6 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from benchmarks._scale.runs import Run, run_measured, warm_up, write_shot  # noqa: E402
-from benchmarks._scale.takes import PerformerAt, performer_at  # noqa: E402
 
 _GOAL = 1.1
 _LABELS = {"vertices": "V", "frames": "T", "bases": "K"}
@@ -35,7 +34,7 @@ def main() -> int:
     said: dict[str, Any] = {}
     with tempfile.TemporaryDirectory(prefix="mien_growth_", dir=options.work) as folder:
         work = Path(folder)
-        warm_up(work / "warm", performer_at(4_326))
+        warm_up(work / "warm")
         base = {"vertices": options.at_vertices, "frames": options.at_frames, "bases": options.at_bases}
         for axis in ("vertices", "frames", "bases"):
             sizes = sorted(getattr(options, axis))
@@ -51,12 +50,8 @@ def _vary(axis: str, sizes: Sequence[int], base: dict[str, int], shot: Path, run
     print(f"\n{axis} {_LABELS[axis]}, with {others}")
     print(f"{_LABELS[axis]:>12}{'s':>9}{'CPU s':>9}{'own GB':>9}{'all GB':>9}", flush=True)
     measured: list[Run] = []
-    performers: dict[int, PerformerAt] = {}
     for size in sizes:
-        at = base | {axis: size}
-        if at["vertices"] not in performers:
-            performers = {at["vertices"]: performer_at(at["vertices"])}
-        measured.append(_measured(at, performers[at["vertices"]], shot, runs))
+        measured.append(_measured(base | {axis: size}, shot, runs))
         run = measured[-1]
         print(f"{size:>12,}{run.total_s:>9.2f}{run.cpu_s:>9.2f}{run.own_gb:>9.3f}{run.peak_gb:>9.3f}", flush=True)
     result: dict[str, Any] = {"sizes": list(sizes), "runs": [run.data() for run in measured], "exponents": {}}
@@ -82,11 +77,11 @@ def exponent(sizes: Sequence[float], values: Sequence[float]) -> float:
     return float(np.polyfit(np.log(sizes), np.log(values), 1)[0])
 
 
-def _measured(at: dict[str, int], performer: PerformerAt, shot: Path, runs: int) -> Run:
+def _measured(at: dict[str, int], shot: Path, runs: int) -> Run:
     """The run that took the least CPU time."""
     shot.mkdir()
     try:
-        write_shot(shot, performer, at["frames"], at["bases"])
+        write_shot(shot, at["vertices"], at["frames"], at["bases"])
         return min((run_measured(shot) for _ in range(runs)), key=lambda run: run.cpu_s)
     finally:
         shutil.rmtree(shot)

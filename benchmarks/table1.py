@@ -27,7 +27,6 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from benchmarks._scale.runs import read_write_floor, run_measured, substitution_floor, warm_up, write_shot  # noqa: E402
-from benchmarks._scale.takes import PerformerAt, performer_at  # noqa: E402
 
 _GOAL = 8
 
@@ -68,14 +67,10 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="mien_table1_", dir=options.work) as folder:
         work = Path(folder)
         _check_space(work, chosen, options)
-        warm_up(work / "warm", performer_at(4_326))
+        warm_up(work / "warm")
         print(_HEAD, flush=True)
-        performers: dict[int, PerformerAt] = {}
         for row in chosen:
-            vertices = round(row.vertices * options.vertices_share)
-            if vertices not in performers:
-                performers = {vertices: performer_at(vertices)}  # one at a time: a large one takes a gigabyte
-            rows.append(_measured(row, performers[vertices], work / "shot", options))
+            rows.append(_measured(row, work / "shot", options))
             print(_line(rows[-1]), flush=True)
             if options.by_stage:
                 print(_stages(rows[-1]), flush=True)
@@ -87,18 +82,19 @@ def main() -> int:
     return 0
 
 
-def _measured(row: PaperRow, performer: PerformerAt, shot: Path, options: argparse.Namespace) -> dict[str, Any]:
+def _measured(row: PaperRow, shot: Path, options: argparse.Namespace) -> dict[str, Any]:
+    vertices = round(row.vertices * options.vertices_share)
     frames = max(round(row.frames * options.share), row.bases + 2)
     shot.mkdir()
     try:
-        write_shot(shot, performer, frames, row.bases)
+        write_shot(shot, vertices, frames, row.bases, options.takes)
         run = min((run_measured(shot) for _ in range(options.runs)), key=lambda one: one.total_s)
-        floors = read_write_floor(shot / "take.npy", shot / "copy.npy"), substitution_floor(shot)
+        floors = read_write_floor(shot), substitution_floor(shot)
     finally:
         shutil.rmtree(shot)
     return {
         "name": row.name,
-        "vertices": performer.mesh.n_vertices,
+        "vertices": vertices,
         "frames": frames,
         "paper_frames": row.frames,
         "paper_s": row.seconds,
@@ -156,6 +152,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--vertices-share", type=float, default=1.0, help="share of the vertices, for a quick look (1)")
     parser.add_argument("--runs", type=int, default=1, help="runs of each row, the fastest counts (1)")
     parser.add_argument("--work", type=Path, help="where to put the takes; up to 26 GiB for the last row")
+    parser.add_argument("--takes", type=Path, metavar="DIR", help="keep the takes here for the next time (9 GiB)")
     parser.add_argument("--by-stage", action="store_true", help="say under each row what each stage took")
     parser.add_argument("--json", action="store_true", help="end with one line of JSON")
     return parser

@@ -19,10 +19,11 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from benchmarks._scale.runs import read_write_floor, run_measured, write_inputs, write_shot  # noqa: E402
-from benchmarks._scale.takes import LEVELS, performer_at  # noqa: E402
+from benchmarks._scale.runs import read_write_floor, run_measured, write_config, write_inputs, write_shot  # noqa: E402
+from benchmarks._scale.takes import LEVELS  # noqa: E402
 from toolkit.feature_lines import load_feature_lines, trace_lines  # noqa: E402
 from toolkit.mesh import TriangleMesh  # noqa: E402
+from toolkit.shot import Shot  # noqa: E402
 
 
 def main() -> int:
@@ -33,12 +34,12 @@ def main() -> int:
         if options.ict:
             _ict(shot, options)
         else:
-            write_shot(shot, performer_at(LEVELS[options.level]), options.frames, options.bases)
-        n_vertices = np.load(shot / "take.npy", mmap_mode="r").shape[1]
+            write_shot(shot, LEVELS[options.level], options.frames, options.bases)
+        n_vertices = np.load(Shot(shot).config.source.frames, mmap_mode="r").shape[1]
         if not options.cold:
             run_measured(shot)  # compiles, and warms the file cache
         runs = sorted((run_measured(shot) for _ in range(options.runs)), key=lambda run: run.total_s)
-        floor = read_write_floor(shot / "take.npy", shot / "copy.npy")
+        floor = read_write_floor(shot)
     run = runs[len(runs) // 2]
     print(f"{n_vertices:,} vertices, {options.frames} frames, K = {run.bases}, median of {len(runs)} runs")
     for name, seconds in run.stages.items():
@@ -52,13 +53,16 @@ def main() -> int:
 
 
 def _ict(folder: Path, options: argparse.Namespace) -> None:
-    bake = [sys.executable, str(options.ict / "bake.py"), str(folder / "baked"), "--frames", str(options.frames)]
+    inputs = folder / "inputs"
+    bake = [sys.executable, str(options.ict / "bake.py"), str(inputs), "--frames", str(options.frames)]
     subprocess.run(bake, check=True)
-    (folder / "baked" / "frames.npy").rename(folder / "take.npy")
-    reference = np.load(folder / "baked" / "reference.npy").astype(float)
-    mesh = TriangleMesh(reference, np.load(folder / "baked" / "triangles.npy").astype(np.int32))
+    (inputs / "frames.npy").rename(inputs / "take.npy")
+    mesh = TriangleMesh(
+        np.load(inputs / "reference.npy").astype(float), np.load(inputs / "triangles.npy").astype(np.int32)
+    )
     lines = trace_lines(load_feature_lines(options.ict / "feature_lines.json"), mesh.vertices, mesh.triangles)
-    write_inputs(folder, mesh, lines, options.bases)
+    write_inputs(inputs, mesh, lines)
+    write_config(folder, inputs, options.bases)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 import threading
@@ -13,10 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._scale.takes import PerformerAt
+from benchmarks._scale.takes import LEVELS, performer_at
 from toolkit.feature_lines import FeatureLine, save_feature_lines
 from toolkit.mesh import TriangleMesh
 from toolkit.meshio import write_mesh
+from toolkit.meshio.aside import folder_aside
+from toolkit.shot import Shot
 
 __all__ = [
     "ROOT",
@@ -25,6 +28,7 @@ __all__ = [
     "run_measured",
     "substitution_floor",
     "warm_up",
+    "write_config",
     "write_inputs",
     "write_shot",
 ]
@@ -53,20 +57,34 @@ class Run:
         return asdict(self)
 
 
-def write_shot(folder: Path, performer: PerformerAt, n_frames: int, n_bases: int) -> None:
-    """A shot of the performer onto a stretched copy of it."""
-    performer.write_take(folder / "take.npy", n_frames)
-    write_inputs(folder, performer.mesh, performer.lines(), n_bases)
+def write_shot(folder: Path, n_vertices: int, n_frames: int, n_bases: int, kept: Path | None = None) -> None:
+    """A shot of the performer onto a stretched copy of it, so that no registration is in the way.
+
+    ``kept`` is a folder where its files stay for the next shot of this size, or were left by an earlier one.
+    """
+    inputs = kept / f"{n_vertices}x{n_frames}" if kept else folder / "inputs"
+    if not inputs.exists():
+        performer = performer_at(n_vertices)
+        with folder_aside(inputs) as aside:
+            performer.write_take(aside / "take.npy", n_frames)
+            write_inputs(aside, performer.mesh, performer.lines())
+    write_config(folder, inputs, n_bases)
 
 
-def write_inputs(folder: Path, mesh: TriangleMesh, lines: list[FeatureLine], n_bases: int) -> None:
-    """All of a shot but ``take.npy``; the target is the source stretched, so that no registration is in the way."""
+def write_inputs(folder: Path, mesh: TriangleMesh, lines: list[FeatureLine]) -> None:
+    """All of a shot's files but ``take.npy``; the target is the source stretched."""
     write_mesh(folder / "source.ply", mesh)
     write_mesh(folder / "target.ply", mesh.with_vertices(mesh.vertices * [1.12, 0.95, 1.05]))
     save_feature_lines(folder / "feature_lines.json", lines)
+
+
+def write_config(folder: Path, inputs: Path, n_bases: int) -> None:
+    """Make a shot of the files in ``inputs``."""
+    shutil.copyfile(inputs / "feature_lines.json", folder / "feature_lines.json")
+    place = inputs.resolve().as_posix()
     (folder / "shot.toml").write_text(
-        '[source]\nreference = "source.ply"\nframes = "take.npy"\nfps = 30\n[target]\nreference = "target.ply"\n'
-        f"[bases]\nthreshold = 1e-6\ncount = {n_bases}\n",
+        f'[source]\nreference = "{place}/source.ply"\nframes = "{place}/take.npy"\nfps = 30\n'
+        f'[target]\nreference = "{place}/target.ply"\n[bases]\nthreshold = 1e-6\ncount = {n_bases}\n',
         encoding="utf-8",
     )
 
@@ -82,10 +100,10 @@ def substitution_floor(shot: Path) -> float:
     return float(_child("substitutions", shot)[0]["seconds"])
 
 
-def read_write_floor(take: Path, copy: Path) -> float:
-    """Seconds to read the take once and to write as many bytes; the copy is removed."""
+def read_write_floor(shot: Path) -> float:
+    """Seconds to read the shot's take once and to write as many bytes; the copy is removed."""
     began = time.perf_counter()
-    source = np.load(take, mmap_mode="r")
+    source, copy = np.load(Shot(shot).config.source.frames, mmap_mode="r"), shot / "copy.npy"
     target = np.lib.format.open_memmap(copy, mode="w+", dtype=source.dtype, shape=source.shape)
     size = max(1, 2**26 // source[:1].nbytes)
     for start in range(0, len(source), size):
@@ -96,10 +114,10 @@ def read_write_floor(take: Path, copy: Path) -> float:
     return seconds
 
 
-def warm_up(folder: Path, performer: PerformerAt) -> None:
+def warm_up(folder: Path) -> None:
     """Run a small shot once, so that everything is compiled."""
     folder.mkdir()
-    write_shot(folder, performer, 40, 3)
+    write_shot(folder, LEVELS[0], 40, 3)
     run_measured(folder)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -60,10 +61,11 @@ class PerformerAt:
         take.flush()
 
 
+@lru_cache(maxsize=1)  # a large one takes a gigabyte
 def performer_at(n_vertices: int, progress: Progress = silent) -> PerformerAt:
     """The performer with ``n_vertices``: the sample's level below, subdivided, then its longest edges split.
 
-    From 275,000 vertices on the surface is Catmull-Clark's of the finest sample.
+    From 275,000 vertices on the surface is Catmull-Clark's of the finest sample. The last one is kept.
     """
     if n_vertices < LEVELS[0]:
         raise InputError(f"the performer has at least {LEVELS[0]} vertices, not {n_vertices}", remedy="ask for more")
