@@ -51,8 +51,8 @@ def _show(options: argparse.Namespace, probe: object) -> int:
     player = Player(options.script) if options.script else None
     recorder = Recorder(options.record) if options.record else None
     worker = Worker()
+    app = App(shot, worker)
     try:
-        app = App(shot, worker)
         probe.check()  # type: ignore[attr-defined]
         from viewer.view.window import Window
 
@@ -62,6 +62,7 @@ def _show(options: argparse.Namespace, probe: object) -> int:
         gc.freeze()
         window.run()
     finally:
+        app.saver.flush()
         worker.stop()
     return 0
 

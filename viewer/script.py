@@ -63,7 +63,7 @@ class Player:
             return
         number, line = self._lines[0]
         waits = not (line.get("event") == "command" and line.get("name") == "cancel")
-        if waits and app.worker.busy:
+        if waits and app.busy:
             return
         self._lines.popleft()
         if "wait" in line:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import InputError
+from toolkit.progress import Progress
 from viewer.modes.base import Mode
 from viewer.stages_process import export_in_process
 from viewer.state.rows import Button, Check, Note, Row
@@ -69,6 +70,10 @@ class ExportMode(Mode):
             raise InputError("no format is chosen", remedy="tick one")
         folder = self.app.shot.path
 
+        def work(progress: Progress) -> list[dict[str, Any]]:
+            self.app.saver.flush()
+            return export_in_process(folder, formats, progress)
+
         def done(reports: list[dict[str, Any]]) -> None:
             self._written = [_in_words(report) for report in reports]
             self.app.say(f"{len(reports)} exported to {self.app.shot.export_folder}", "good")
@@ -80,9 +85,7 @@ class ExportMode(Mode):
             self.app.touch("panel")
 
         self._written = []
-        self.app.run_task(
-            "exporting", lambda progress: export_in_process(folder, formats, progress), done, failed=failed
-        )
+        self.app.run_task("exporting", work, done, failed=failed)
 
 
 def _in_words(report: dict[str, Any]) -> str:

@@ -6,7 +6,7 @@ Every finished line is written to feature_lines.json at once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -186,8 +186,8 @@ class FeatureLineMode(Mode):
         elif name == "line guide" and 0 <= self.chosen < len(self._lines):
             self._set(_with(self._lines, self.chosen, replace(self._lines[self.chosen], guide=bool(value))))
         elif name == "line save":
-            self._save()
-            self.app.say(f"{len(self._lines)} lines are in {self.app.shot.feature_lines_path}", "good")
+            words = f"{len(self._lines)} lines are in {self.app.shot.feature_lines_path}"
+            self._save(lambda: self.app.say(words, "good"))
 
     def leave(self) -> None:
         """A line that was begun is kept, as an open one."""
@@ -307,8 +307,9 @@ class FeatureLineMode(Mode):
         self._lines = lines
         self._save()
 
-    def _save(self) -> None:
-        save_feature_lines(self.app.shot.feature_lines_path, self._lines)
+    def _save(self, done: Callable[[], None] = lambda: None) -> None:
+        path, lines = self.app.shot.feature_lines_path, self._lines
+        self.app.saver.save(path, lambda: save_feature_lines(path, lines), done)
         self.app.touch("overlay", "panel", "status")
         self.app.check_steps()
 

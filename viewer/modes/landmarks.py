@@ -5,7 +5,7 @@ Every finished pair, and every correction, is written to landmarks.json at once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -186,8 +186,8 @@ class LandmarkMode(Mode):
         elif name == "landmark delete":
             self._delete()
         elif name == "landmark save":
-            self._save()
-            self.app.say(f"{self.count} pairs are in {self.app.shot.landmarks_path}", "good")
+            words = f"{self.count} pairs are in {self.app.shot.landmarks_path}"
+            self._save(lambda: self.app.say(words, "good"))
 
     def undo(self) -> bool:
         """Take back the last pick or correction."""
@@ -257,10 +257,11 @@ class LandmarkMode(Mode):
             self._change(self._pairs[: self.chosen] + self._pairs[self.chosen + 1 :])
             self.chosen = min(self.chosen, len(self._pairs) - 1)
 
-    def _save(self) -> None:
-        whole = [pair for pair in self._pairs if pair.whole]
+    def _save(self, done: Callable[[], None] = lambda: None) -> None:
+        whole, path = [pair for pair in self._pairs if pair.whole], self.app.shot.landmarks_path
         source, target = [p.source or 0 for p in whole], [p.target or 0 for p in whole]
-        save_landmarks(self.app.shot.landmarks_path, Landmarks.of(source, target, [p.name for p in whole]))
+        landmarks = Landmarks.of(source, target, [p.name for p in whole])
+        self.app.saver.save(path, lambda: save_landmarks(path, landmarks), done)
         self.app.touch("overlay", "panel", "status")
         self.app.check_steps()
 

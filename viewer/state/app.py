@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.errors import InputError
+from toolkit.progress import Progress
 from toolkit.shot import Shot
 from viewer.compiled import load_compiled
 from viewer.modes.base import Mode, Tint
+from viewer.saver import Saver
 from viewer.state import commands, look
 from viewer.state.cameras import Viewpoint
 from viewer.state.events import Event, Key, PanelInput, Pointer, TimelineInput
@@ -57,6 +59,7 @@ class App(Scene):
         self.shot = shot
         self.worker = worker
         worker.on_error = self._task_failed
+        self.saver = Saver(lambda error: self.say(f"not saved: {error}", "bad"))
         self.steps: Steps | None = None
         self.wireframe = False
         self.maps = Maps(self)
@@ -159,6 +162,7 @@ class App(Scene):
         """Let time pass: playback, and results of long work."""
         if self.worker.drain():
             self.touch("status")
+        self.saver.drain()
         running = self.worker.progress is not None
         if running:
             self.touch("status")
@@ -231,6 +235,11 @@ class App(Scene):
 
     # -- long work ------------------------------------------------------------------------------------------------
 
+    @property
+    def busy(self) -> bool:
+        """Whether anything runs, waits to run or is not on disk yet."""
+        return self.worker.busy or self.saver.busy
+
     def run_task(
         self,
         name: str,
@@ -255,7 +264,17 @@ class App(Scene):
                 self.editing.open_if_ready()
             self.touch("panel", "status")
 
-        self.run_task("looking at the shot", lambda progress: find_steps(self.shot), done, slot="steps", quiet=True)
+        def work(progress: Progress) -> Steps:
+            self.saver.flush()
+            return find_steps(self.shot)
+
+        self.run_task("looking at the shot", work, done, slot="steps", quiet=True)
+
+    def refresh_modes(self) -> None:
+        """Let every mode read again what it keeps of the shot, which is on disk by then."""
+        self.saver.flush()
+        for mode in self.modes.values():
+            mode.refresh()
 
     def reload(self) -> None:
         """Stages were run: read the shot again."""
@@ -265,8 +284,7 @@ class App(Scene):
         self.forget_surfaces(stills=True)
         self.maps.forget()
         self.editing.close()
-        for mode in self.modes.values():
-            mode.refresh()
+        self.refresh_modes()
         if not self.can_show(self.pair):
             self.choose_pair("references")
         self.faces_changed()

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from toolkit.errors import InputError
+from toolkit.progress import Progress
 from viewer.stages_process import run_in_process
 from viewer.state.cameras import Viewpoint
 from viewer.state.events import Command, Key, PanelInput, TimelineInput
@@ -108,6 +109,10 @@ def _run_stages(app: App, which: Any) -> None:
     app.mode.leave()  # nothing half done is left out
     app.mode.enter()
 
+    def work(progress: Progress) -> list[dict[str, Any]]:
+        app.saver.flush()
+        return run_in_process(folder, stages, progress)
+
     def done(reports: list[dict[str, Any]]) -> None:
         seconds = sum(float(report["seconds"]) for report in reports)
         ran = [report["stage"] for report in reports if not report["skipped"]]
@@ -124,7 +129,7 @@ def _run_stages(app: App, which: Any) -> None:
         app.say("stopped; what was finished is kept" if stopped else str(error), "bad")
         app.reload()
 
-    app.run_task("running", lambda progress: run_in_process(folder, stages, progress), done, failed=failed)
+    app.run_task("running", work, done, failed=failed)
 
 
 def _escape(app: App, shift: bool) -> None:

@@ -93,8 +93,7 @@ class Editing:
                 return
             self.session, self.problem = opened[0], ""
             self._take(opened[1])
-            for mode in self._app.modes.values():
-                mode.refresh()
+            self._app.refresh_modes()
             self._app.touch()
 
         def failed(error: Exception) -> None:

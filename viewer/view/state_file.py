@@ -24,7 +24,7 @@ def write_state(path: Path, window: Window) -> None:
     state = {
         "size": [size.width, size.height],
         "warm": window.warm,
-        "busy": app.worker.busy,
+        "busy": app.busy,
         "script": window.playing_script,
         "stalls": {kind: asdict(one) for kind, one in window.stalls.longest.items()},
         "playing": app.play.playing,

@@ -197,7 +197,7 @@ class Window:
 
     def _write_state(self, changed: bool) -> None:
         """After changes, and once more when they have been drawn."""
-        busy = self.app.worker.busy
+        busy = self.app.busy
         if changed or self._stale or busy != self._was_busy or self._ticks == _WARM + 1:
             self._stale, self._was_busy = changed, busy
             write_state(self._state_file, self)  # type: ignore[arg-type]

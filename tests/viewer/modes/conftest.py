@@ -57,7 +57,7 @@ class Hand:
         self._travel = 0.0
 
     def wait(self) -> None:
-        while self.app.worker.busy:
+        while self.app.busy:
             self.app.worker.wait(30)
             self.app.tick(0.0)
 

@@ -29,7 +29,7 @@ def test_what_is_chosen_is_written_with_the_edits(hand, shot: Shot) -> None:
     app.handle(PanelInput("format:npy", True))
     app.handle(PanelInput("export now"))
     seen = set()
-    while app.worker.busy:
+    while app.busy:
         progress = app.worker.progress
         seen |= {progress[0]} if progress is not None else set()
         app.tick(0.01)

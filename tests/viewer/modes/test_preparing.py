@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from toolkit.feature_lines import load_feature_lines
+from toolkit.feature_lines import FeatureLine, load_feature_lines
 from toolkit.mesh import TriangleMesh
 from toolkit.meshio import write_mesh
 from toolkit.shot import Shot
+from viewer.modes import landmarks
 from viewer.script import Player
 from viewer.state.app import App
 from viewer.state.events import Command, Key, PanelInput
@@ -49,10 +51,19 @@ def user(raw: Shot, workers: list[Worker]):
     return hand
 
 
-def pairs(shot: Shot) -> list[tuple[int, int]]:
-    if not shot.landmarks_path.exists():
+def pairs(user) -> list[tuple[int, int]]:
+    """What is on disk."""
+    user.app.saver.flush()
+    path = user.app.shot.landmarks_path
+    if not path.exists():
         return []
-    return [(p["source"], p["target"]) for p in json.loads(shot.landmarks_path.read_text())["pairs"]]
+    return [(p["source"], p["target"]) for p in json.loads(path.read_text())["pairs"]]
+
+
+def lines(user) -> list[FeatureLine]:
+    """What is on disk."""
+    user.app.saver.flush()
+    return load_feature_lines(user.app.shot.feature_lines_path)
 
 
 def test_a_raw_shot_begins_with_landmarks_and_says_what_to_do(user) -> None:
@@ -69,17 +80,18 @@ def test_a_raw_shot_begins_with_landmarks_and_says_what_to_do(user) -> None:
 def test_pairs_are_picked_on_either_face_first_and_are_on_disk(user, raw: Shot) -> None:
     app = user.app
     user.click(300, pane=0)
-    assert pairs(raw) == []
+    assert pairs(user) == []
     assert "same point on the target" in app.status_line()[0]
     user.click(120, pane=1)
-    assert pairs(raw) == [(300, 120)]
+    assert pairs(user) == [(300, 120)]
     user.click(500, pane=1)
     user.click(410, pane=0)
-    assert pairs(raw) == [(300, 120), (410, 500)]
+    assert pairs(user) == [(300, 120), (410, 500)]
     discs = [[mark.text for mark in app.marks(pane) if isinstance(mark, Disc)] for pane in (0, 1)]
     assert discs == [["1", "2"], ["1", "2"]]
     app.handle(PanelInput("landmark", 0))
     app.handle(PanelInput("landmark name", "nose tip"))
+    user.wait()
     assert json.loads(raw.landmarks_path.read_text())["pairs"][0]["name"] == "nose tip"
 
 
@@ -88,15 +100,15 @@ def test_a_landmark_is_dragged_undone_redone_and_deleted(user, raw: Shot) -> Non
     user.click(300, pane=0)
     user.click(120, pane=1)
     user.drag(user.pixel_of(300, 0), user.pixel_of(332, 0), pane=0)
-    assert pairs(raw) == [(332, 120)]
+    assert pairs(user) == [(332, 120)]
     app.handle(Key("z"))
-    assert pairs(raw) == [(300, 120)]
+    assert pairs(user) == [(300, 120)]
     app.handle(Key("z", ("shift",)))
-    assert pairs(raw) == [(332, 120)]
+    assert pairs(user) == [(332, 120)]
     app.handle(Key("delete"))
-    assert pairs(raw) == []
+    assert pairs(user) == []
     app.handle(Key("z"))
-    assert pairs(raw) == [(332, 120)]
+    assert pairs(user) == [(332, 120)]
 
 
 def test_marks_are_taken_hold_of_from_farther_on_a_dense_screen(user, raw: Shot) -> None:
@@ -120,7 +132,30 @@ def test_escape_drops_a_half_pair_and_another_pick_moves_it(user, raw: Shot) -> 
     user.click(310, pane=0)
     user.click(420, pane=0)  # a better place for the same point
     user.click(120, pane=1)
-    assert pairs(raw) == [(420, 120)]
+    assert pairs(user) == [(420, 120)]
+
+
+def test_a_slow_disk_holds_neither_the_window_nor_loses_a_pick(
+    user, raw: Shot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save, gate = landmarks.save_landmarks, threading.Event()
+    monkeypatch.setattr(landmarks, "save_landmarks", lambda *told: (gate.wait(20), save(*told)))
+    app = user.app
+    places = [(user.pixel_of(300, 0), 0), (user.pixel_of(120, 1), 1)]
+    for place, pane in places:  # returns while nothing is written yet
+        user.send("press", *place, pane)
+        user.send("release", *place, pane)
+    app.handle(PanelInput("landmark save"))
+    app.tick(0.0)
+    assert not raw.landmarks_path.exists()
+    assert app.busy
+    assert "pairs are in" not in app.message
+    threading.Timer(0.2, gate.set).start()
+    app.refresh_modes()  # reads what is on disk, which is what was picked
+    assert pairs(user) == [(300, 120)]
+    assert app.modes["landmarks"].count == 1
+    user.wait()
+    assert "1 pairs are in" in app.message
 
 
 def test_a_drag_beside_a_landmark_turns_the_view(user) -> None:
@@ -143,7 +178,7 @@ def test_a_closed_line_follows_edges_and_survives_undo_and_reopening(user, raw: 
     assert len([m for m in app.marks(0) if isinstance(m, Disc)]) == 3
     app.handle(Key("z", ("shift",)))
     app.handle(Key("c"))
-    (line,) = load_feature_lines(raw.feature_lines_path)
+    (line,) = lines(user)
     assert line.closed
     edges = {tuple(sorted(e)) for t in bump.triangles for e in ((t[0], t[1]), (t[1], t[2]), (t[2], t[0]))}
     assert all(tuple(sorted(pair)) in edges for pair in line.edges().tolist())
@@ -151,10 +186,10 @@ def test_a_closed_line_follows_edges_and_survives_undo_and_reopening(user, raw: 
     app.handle(PanelInput("line name", "mouth_outer"))
     app.handle(Key("z"))
     app.handle(Key("z"))
-    assert load_feature_lines(raw.feature_lines_path) == []
+    assert lines(user) == []
     app.handle(Key("z", ("shift",)))
     app.handle(Key("z", ("shift",)))
-    assert [x.name for x in load_feature_lines(raw.feature_lines_path)] == ["mouth_outer"]
+    assert [x.name for x in lines(user)] == ["mouth_outer"]
     app.reload()
     user.wait()
     assert any(isinstance(mark, Curve) and mark.closed for mark in app.marks(0))
@@ -168,7 +203,7 @@ def test_the_targets_side_of_a_line_and_leaving_in_the_middle(user, raw: Shot) -
     user.click(163, pane=0)
     user.click(176, pane=0)
     app.choose_mode("look")  # what was begun is kept, open
-    (line,) = load_feature_lines(raw.feature_lines_path)
+    (line,) = lines(user)
     assert not line.closed
     app.choose_mode("feature_lines")
     app.handle(PanelInput("line", 0))
@@ -176,16 +211,16 @@ def test_the_targets_side_of_a_line_and_leaving_in_the_middle(user, raw: Shot) -
     user.click(last - 163, pane=1)
     user.click(last - 176, pane=1)
     app.handle(Key("enter"))
-    (line,) = load_feature_lines(raw.feature_lines_path)
+    (line,) = lines(user)
     assert line.target_vertices is not None
     assert [last - v for v in line.target_vertices.tolist()][:: len(line.target_vertices) - 1] == [163, 176]
     assert not line.guide
     app.handle(PanelInput("line guide", True))
-    (line,) = load_feature_lines(raw.feature_lines_path)
+    (line,) = lines(user)
     assert line.guide
     assert line.target_vertices is not None
     app.handle(Key("delete"))
-    assert load_feature_lines(raw.feature_lines_path) == []
+    assert lines(user) == []
 
 
 def test_stages_run_from_here_and_can_be_cancelled(user, raw: Shot, bump: TriangleMesh) -> None:
@@ -221,4 +256,4 @@ def test_a_script_may_point_at_a_vertex(user, raw: Shot, tmp_path: Path) -> None
     while not player.finished:
         player.play(user.app.handle, user.app)
         user.wait()
-    assert pairs(raw) == [(300, 120)]
+    assert pairs(user) == [(300, 120)]

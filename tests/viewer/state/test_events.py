@@ -36,8 +36,7 @@ def test_what_is_no_event_is_refused() -> None:
 class Quiet:
     """As much of an application as the player looks at."""
 
-    class worker:  # noqa: N801
-        busy = False
+    busy = False
 
 
 def test_what_was_recorded_is_played_again(tmp_path: Path) -> None:
@@ -57,8 +56,7 @@ def test_a_script_waits_for_long_work_but_not_to_cancel_it(tmp_path: Path) -> No
     player, played = Player(script), []
 
     class Busy(Quiet):
-        class worker:  # noqa: N801
-            busy = True
+        busy = True
 
     player.play(played.append, Busy)
     player.play(played.append, Busy)

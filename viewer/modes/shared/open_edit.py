@@ -120,8 +120,7 @@ class OpenEdit(Mode, Generic[D]):
 
     def _restore(self) -> None:
         """Take up the edit that was open when the viewer was closed or killed."""
-        file = DraftFile(self.app.shot)
-        data = file.read(self.kind)
+        data = DraftFile(self.app.shot).read(self.kind)
         if data is None:
             return
         try:
@@ -135,7 +134,7 @@ class OpenEdit(Mode, Generic[D]):
             self.app.say(f"the {self.title.lower()} that was open does not fit the shot any more", "bad")
             return
         if committed or (kept.instead_of is not None and kept.instead_of not in edits):
-            file.write(self.kind, None)  # killed between the journal's line and this
+            self._keep()  # killed between the journal's line and this
             return
         self.draft, self._undo = kept, [None]
         if self.app.mode is not self:
@@ -219,7 +218,8 @@ class OpenEdit(Mode, Generic[D]):
         return True
 
     def _keep(self) -> None:
-        DraftFile(self.app.shot).write(self.kind, None if self.draft is None else self.draft.to_data())
+        file, data = DraftFile(self.app.shot), None if self.draft is None else self.draft.to_data()
+        self.app.saver.save((file.path, self.kind), lambda: file.write(self.kind, data))
 
     # -- the end --------------------------------------------------------------------------------------------------
 
@@ -235,6 +235,7 @@ class OpenEdit(Mode, Generic[D]):
         self.committing = True
 
         def work(session: EditSession, progress: Progress) -> int:
+            self.app.saver.flush()  # what is kept of it is no older than what the journal says
             if number is None:
                 return session.add(kind, data, progress).number
             session.change(number, data, progress)
