@@ -1,5 +1,6 @@
 """Formats that hold exact float32 frames: what is read back is what was exported, bit for bit."""
 
+import os
 import struct
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from toolkit.errors import InputError, MissingDependencyError
 from toolkit.export import FORMATS, Performance, export
 from toolkit.mesh import TriangleMesh
 from toolkit.meshio import open_sequence, read_mesh, write_mesh
+from toolkit.meshio.leftovers import temporary_name
 
 NAMES = {"usd": "a.usdc", "abc": "a.abc", "pc2": "a.pc2", "mdd": "a.mdd", "npy": "a.npy", "obj": "objs", "ply": "plys"}
 
@@ -181,3 +183,12 @@ def test_importing_brings_no_heavy_library():
     code = "import sys, toolkit.export; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert not {"open3d", "trimesh", "pxr", "alembic3d", "imath"} & set(loaded)
+
+
+def test_what_a_killed_export_left_is_gone_after_the_next(tmp_path, performance):
+    # A number that no process has: the one that wrote it is dead.
+    (tmp_path / temporary_name(tmp_path / "a.pc2").name.replace(f"-{os.getpid()}-", f"-{2**22 + 1}-")).write_bytes(b"x")
+    mine = temporary_name(tmp_path / "b.pc2")
+    mine.write_bytes(b"half")
+    export(performance, tmp_path / "a.pc2", "pc2")
+    assert {path.name for path in tmp_path.iterdir()} == {"a.pc2", mine.name}

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from toolkit.errors import InputError
 from toolkit.export.performance import Performance
+from toolkit.meshio.leftovers import remove_leftovers
 from toolkit.progress import Progress, silent
 
 __all__ = ["FORMATS", "ExportReport", "Format", "export"]
@@ -54,6 +55,8 @@ class ExportReport:
 def export(performance: Performance, path: str | Path, format: str, progress: Progress = silent) -> ExportReport:
     """Write a performance to ``path`` in one of `FORMATS`; it appears there only when it is complete.
 
+    What killed exports left half written beside it is removed.
+
     Raises
     ------
     InputError : an unknown format, a path that does not suit it, a folder that holds other files
@@ -69,6 +72,7 @@ def export(performance: Performance, path: str | Path, format: str, progress: Pr
     if bool(chosen.suffixes) == path.is_dir() and path.exists():
         what = "is a folder, but the format is one file" if chosen.suffixes else "is a file, but the format is a folder"
         raise InputError(what, where=path, remedy="give another path")
+    remove_leftovers(path.parent)
     module, function = chosen.writer.split(":")
     write: Callable = getattr(import_module(f"toolkit.export.{module}"), function)
     deviation = write(performance, path, progress) or (0.0, 0.0)

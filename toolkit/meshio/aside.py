@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import errno
 import os
-import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from toolkit.meshio.leftovers import temporary_name
 
 __all__ = ["folder_aside", "written_aside"]
 
@@ -24,7 +25,7 @@ def written_aside(path: str | Path, *, room: int = 0) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     if room > shutil.disk_usage(path.parent).free:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-    temporary = _temporary_name(path)
+    temporary = temporary_name(path)
     try:
         yield temporary
         _flush_to_disk(temporary)
@@ -42,7 +43,7 @@ def folder_aside(path: str | Path) -> Iterator[Path]:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = _temporary_name(path)
+    temporary = temporary_name(path)
     temporary.mkdir()
     try:
         yield temporary
@@ -54,16 +55,12 @@ def folder_aside(path: str | Path) -> Iterator[Path]:
         raise
 
 
-def _temporary_name(path: Path) -> Path:
-    return path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
-
-
 def _replace_folder(new: Path, path: Path) -> None:
     """Rename ``new`` to ``path``; a folder in use cannot be overwritten in one step, so the old one steps aside."""
     if not path.exists():
         os.rename(new, path)
         return
-    old = _temporary_name(path)
+    old = temporary_name(path)
     os.rename(path, old)
     try:
         os.rename(new, path)

@@ -7,7 +7,6 @@ process leaves either the old stage or the new.
 from __future__ import annotations
 
 import json
-import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from toolkit.errors import InputError
 from toolkit.meshio.aside import folder_aside
+from toolkit.meshio.leftovers import remove_leftovers
 from toolkit.meshio.npy import write_array
 from toolkit.shot.config import ShotConfig, load_config
 from toolkit.shot.hashing import HashCache
@@ -153,10 +153,9 @@ class Shot:
         self.hashes.save()
 
     def remove_leftovers(self) -> None:
-        """Delete what a killed process left half written."""
-        for folder in (self.path, self.path / "stages"):
-            for left in folder.glob(".*.part*"):
-                shutil.rmtree(left, ignore_errors=True) if left.is_dir() else left.unlink(missing_ok=True)
+        """Delete what killed processes left half written."""
+        for folder in (self.path, self.path / "stages", self.export_folder, self.render_folder):
+            remove_leftovers(folder)
 
 
 def _size(path: Path) -> int:

@@ -266,6 +266,7 @@ class App(Scene):
 
         def work(progress: Progress) -> Steps:
             self.saver.flush()
+            self.shot.remove_leftovers()
             return find_steps(self.shot)
 
         self.run_task("looking at the shot", work, done, slot="steps", quiet=True)
