@@ -5,13 +5,17 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from toolkit.meshio.leftovers import temporary_name
 
 __all__ = ["folder_aside", "written_aside"]
+
+_FLUSH_SECONDS = 0.25
 
 
 @contextmanager
@@ -46,9 +50,8 @@ def folder_aside(path: str | Path) -> Iterator[Path]:
     temporary = temporary_name(path)
     temporary.mkdir()
     try:
-        yield temporary
-        for file in temporary.iterdir():
-            _flush_to_disk(file)
+        with _flushed(temporary):
+            yield temporary
         _replace_folder(temporary, path)
     except BaseException:
         shutil.rmtree(temporary, ignore_errors=True)
@@ -68,6 +71,34 @@ def _replace_folder(new: Path, path: Path) -> None:
         os.rename(old, path)
         raise
     shutil.rmtree(old, ignore_errors=True)
+
+
+@contextmanager
+def _flushed(folder: Path) -> Iterator[None]:
+    """See to it that what the block writes into ``folder`` is on the disk when it ends.
+
+    A thread flushes the files while they are being written: the disk works beside the processor, not after it.
+    """
+    done = threading.Event()
+
+    def flush_meanwhile() -> None:
+        while not done.wait(_FLUSH_SECONDS):
+            _flush_files(folder)
+
+    with ThreadPoolExecutor(1, "flush") as pool:
+        meanwhile = pool.submit(flush_meanwhile)
+        try:
+            yield
+        finally:
+            done.set()
+        meanwhile.result()  # the system tells of a failed write only once
+    _flush_files(folder)
+
+
+def _flush_files(folder: Path) -> None:
+    for file in folder.iterdir():
+        with suppress(FileNotFoundError):  # it had a passing name only
+            _flush_to_disk(file)
 
 
 def _flush_to_disk(file: Path) -> None:

@@ -1,0 +1,58 @@
+"""Folders written aside reach the disk while they are written, and errors on the way there are not lost."""
+
+from __future__ import annotations
+
+import errno
+import threading
+from pathlib import Path
+
+import pytest
+
+from toolkit.meshio import aside
+from toolkit.meshio.aside import folder_aside
+
+
+def test_files_are_flushed_while_the_folder_is_being_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    flushed = threading.Event()
+    monkeypatch.setattr(aside, "_FLUSH_SECONDS", 0.001)
+    monkeypatch.setattr(aside, "_flush_to_disk", lambda file: flushed.set() if file.name == "a" else None)
+    with folder_aside(tmp_path / "stage") as folder:
+        (folder / "a").write_bytes(b"1")
+        assert flushed.wait(30)
+    assert (tmp_path / "stage" / "a").read_bytes() == b"1"
+
+
+def test_an_error_of_the_disk_meanwhile_stops_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    failed = threading.Event()
+
+    def fail_once(file: Path) -> None:
+        if not failed.is_set():
+            failed.set()
+            raise OSError(errno.EIO, "Input/output error", str(file))
+
+    (tmp_path / "stage").mkdir()
+    (tmp_path / "stage" / "a").write_bytes(b"old")
+    monkeypatch.setattr(aside, "_FLUSH_SECONDS", 0.001)
+    monkeypatch.setattr(aside, "_flush_to_disk", fail_once)
+    with pytest.raises(OSError, match="Input/output"), folder_aside(tmp_path / "stage") as folder:
+        (folder / "a").write_bytes(b"new")
+        assert failed.wait(30)
+    assert [file.name for file in tmp_path.iterdir()] == ["stage"]
+    assert (tmp_path / "stage" / "a").read_bytes() == b"old"
+
+
+def test_a_file_with_a_passing_name_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    gone = threading.Event()
+
+    def lose(file: Path) -> None:
+        if file.name == "passing":
+            file.unlink()
+            gone.set()
+            raise FileNotFoundError(file)
+
+    monkeypatch.setattr(aside, "_FLUSH_SECONDS", 0.001)
+    monkeypatch.setattr(aside, "_flush_to_disk", lose)
+    with folder_aside(tmp_path / "stage") as folder:
+        (folder / "passing").write_bytes(b"1")
+        assert gone.wait(30)
+    assert list((tmp_path / "stage").iterdir()) == []
