@@ -34,9 +34,14 @@ def test_an_error_of_the_disk_meanwhile_stops_the_folder(tmp_path: Path, monkeyp
     (tmp_path / "stage" / "a").write_bytes(b"old")
     monkeypatch.setattr(aside, "_FLUSH_SECONDS", 0.001)
     monkeypatch.setattr(aside, "_flush_to_disk", fail_once)
-    with pytest.raises(OSError, match="Input/output"), folder_aside(tmp_path / "stage") as folder:
-        (folder / "a").write_bytes(b"new")
-        assert failed.wait(30)
+
+    def write_anew() -> None:
+        with folder_aside(tmp_path / "stage") as folder:
+            (folder / "a").write_bytes(b"new")
+            assert failed.wait(30)
+
+    with pytest.raises(OSError, match="Input/output"):
+        write_anew()
     assert [file.name for file in tmp_path.iterdir()] == ["stage"]
     assert (tmp_path / "stage" / "a").read_bytes() == b"old"
 
