@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from toolkit.quality import detail_energy
 from toolkit.rendering.takes import View
 from toolkit.report import ReportData, build, sections
+from toolkit.report.data import Figure
 from toolkit.report.pictures import bases_figures, coating_figures, motion_figures, registration_figures
 from toolkit.smoothing import SmoothingFilter, SmoothingParameters
 
@@ -83,3 +85,19 @@ def test_all_sections_make_one_page(count):
     assert page.count("</i>basis") == (count if 1 < count <= 6 else 0)
     assert re.search(r"<td>Total \(s\)</td><td[^>]*>3.75</td>", page.replace("\n", ""))
     assert page.count("<section") == 7
+
+
+def test_the_close_up_holds_the_whole_of_a_face_with_a_snout(ball):
+    # What lies in front is seen larger: a snout pushes the chin out of a picture that is zoomed to the middle.
+    x, y, z = ball.rest.T
+    face = replace(ball, rest=np.stack([x, y, z + 3 * np.maximum(z, 0) * np.maximum(-y, 0)], axis=1))
+    only, everything = np.flatnonzero((np.abs(x) < 0.1) & (np.abs(y) < 0.1)), np.arange(len(ball.rest))
+    near = registration_figures(face, np.ones(len(x)), "mm", only=only)[-1]
+    whole = registration_figures(face, np.ones(len(x)), "mm", only=only, close_up=everything)[-1]
+
+    def at_its_rim(figure: Figure) -> np.ndarray:
+        return np.concatenate([figure.image[[0, -1]].reshape(-1, 3), figure.image[:, [0, -1]].reshape(-1, 3)])
+
+    empty = at_its_rim(whole).max()
+    assert (whole.image > empty).any(axis=2).mean() > 0.1
+    assert (at_its_rim(near) > empty).any()

@@ -66,11 +66,6 @@ class Camera:
         turned = np.cos(e) * (np.cos(a) * toward + np.sin(a) * right) + np.sin(e) * above
         return replace(self, position=_triple(np.asarray(self.target) + self.distance * turned))
 
-    def zoomed(self, factor: float) -> Camera:
-        """Return the camera with its distance divided by ``factor``."""
-        offset = np.asarray(self.position) - np.asarray(self.target)
-        return replace(self, position=_triple(np.asarray(self.target) + offset / factor))
-
     @property
     def distance(self) -> float:
         """Distance from the camera to its target, in the mesh's unit."""

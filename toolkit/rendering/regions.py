@@ -14,6 +14,7 @@ CLOSE_UPS: dict[str, tuple[str, float, float]] = {
     "eyes": (r"eye(?!brow)|lid|canthus", 1.35, 2.4),
     "mouth": (r"lip|mouth|philtrum|labio", 1.5, 1.3),
     "forehead": (r"brow|forehead|glabella|nasion", 1.2, 1.9),
+    "features": (r"eye|lid|canthus|brow|nose|nasal|lip|mouth|chin|menton|gnathion|pogonion", 1.15, 0.8),
 }
 """Name to (pattern of the landmarks' names, how much larger than their box to show, width / height of the picture)."""
 

@@ -11,6 +11,7 @@ from toolkit.errors import InputError
 from toolkit.rendering.colormap import ColorScale, add_legend
 from toolkit.rendering.fields import coating_fields, motion_field
 from toolkit.rendering.overlay import Lines
+from toolkit.rendering.regions import close_up_vertices
 from toolkit.rendering.renderer import Renderer
 from toolkit.rendering.sheet import Row, contact_sheet
 from toolkit.rendering.shots import ShotViews
@@ -63,6 +64,7 @@ def shot_registration_figures(shot: Shot, views: ShotViews) -> list[Figure]:
         original=(target.vertices, target.triangles),
         lines=[Lines(line.vertices, line.closed) for line in load_lines(shot)],
         landmarks=np.array(list(views.landmarks.values()), dtype=np.int64),
+        close_up=close_up_vertices("features", views.source.rest, views.landmarks),
         interior=interior if interior.any() else None,
     )
 

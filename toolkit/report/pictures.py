@@ -32,13 +32,15 @@ def registration_figures(
     lines: Sequence[Lines] = (),
     landmarks: Ids | None = None,
     only: Ids | None = None,
+    close_up: Ids | None = None,
     interior: NDArray[np.bool_] | None = None,
 ) -> list[Figure]:
     """Draw the target as given, the source's mesh in its shape, its distance from the target, and its wires.
 
     ``target`` views the registered face (source topology), ``distance`` (V,) from the target's surface, ``original``
     the target's own vertices and triangles, ``lines`` and ``landmarks`` on the source's topology, ``only`` the
-    vertices that the camera frames, ``interior`` (V,) what follows and is not fitted, shown grey.
+    vertices that the camera frames, ``close_up`` those that the picture of the wires frames instead, ``interior`` (V,)
+    what follows and is not fitted, shown grey.
     """
     camera = target.camera(_SIZE[0] / _SIZE[1], only=only)
     renderer = Renderer(target.triangles, target.material)
@@ -53,7 +55,8 @@ def registration_figures(
     scale = ColorScale.unsigned(shown, "distance from the target's surface", unit)
     painted = renderer.render(target.rest, camera, _SIZE, colors=scale.colors(shown))
     figures.append(Figure(add_legend(painted, scale), "Distance from the target's surface; grey is not fitted."))
-    wired = renderer.render(target.rest, camera.zoomed(1.9), _SIZE, wireframe=0.9)
+    near = target.camera(_SIZE[0] / _SIZE[1], only=only if close_up is None else close_up, margin=0.03)
+    wired = renderer.render(target.rest, near, _SIZE, wireframe=0.9)
     figures.append(Figure(wired, "Close-up: triangles should flow evenly, without folds at lids and lips."))
     return figures
 
