@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 from typing import Any
 
 from _cli import parser_for, run
@@ -21,8 +22,10 @@ def main(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     from toolkit.shot import Shot
 
     shot = Shot(options.shot)
-    data = report_data(shot, forward=options.forward, up=options.up, frames=options.count, progress=progress)
-    path = options.out or shot.report_path
+    path = Path(options.out or shot.report_path)
+    data = report_data(
+        shot, forward=options.forward, up=options.up, frames=options.count, folder=path.parent, progress=progress
+    )
     with written_aside(path) as temporary:
         temporary.write_text(build(data), encoding="utf-8")
     print(f"report: {path}")

@@ -16,6 +16,7 @@ from toolkit.report.numbers import format_value, number_rows
         (np.float32(2.5), "2.5"),
         ([1, 2.5, "x"], "1, 2.5, x"),
         (np.arange(20), "0, 1, 2, 3, 4, 5, 6, 7, … (20 in all)"),
+        ([], "none"),
         ("mm", "mm"),
     ],
 )
@@ -39,3 +40,10 @@ def test_an_explanation_is_given_once():
 
 def test_what_is_not_finite_has_no_verdict():
     assert number_rows({"flips": float("nan")})[0].verdict == ""
+
+
+def test_settings_are_not_judged_and_rounding_is_nothing():
+    (limit,) = number_rows({"register": {"max_flips": 0.05}}, judged=False)
+    assert (limit.value, limit.judge, limit.verdict) == ("0.05", "", "")
+    (found,) = number_rows({"distance_median_share": 4e-9})
+    assert (found.value, found.verdict) == ("0 %", "good")

@@ -33,7 +33,8 @@ class Chart:
 class Section:
     """One stage of the work. ``numbers`` may nest; each known one is shown with how to judge it (``glossary``).
 
-    ``notes`` are sentences, such as what the input checks found.
+    ``notes`` are sentences, such as what the input checks found. Where they are settings and no findings they are not
+    ``judged``.
     """
 
     title: str
@@ -42,6 +43,7 @@ class Section:
     charts: Sequence[Chart] = ()
     numbers: Mapping[str, Any] = field(default_factory=dict)
     notes: Sequence[str] = ()
+    judged: bool = True
 
 
 @dataclass(frozen=True)

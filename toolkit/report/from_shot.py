@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +27,7 @@ from toolkit.stages.decompose import source_decomposer
 from toolkit.stages.inputs import load_lines
 from toolkit.stages.register import load_target
 
-__all__ = ["report_data"]
+__all__ = ["report_data", "result_links"]
 
 Vector = tuple[float, float, float]
 _UNIT = "unit of the file"
@@ -38,9 +40,13 @@ def report_data(
     forward: Vector = (0.0, 0.0, 1.0),
     up: Vector = (0.0, 1.0, 0.0),
     frames: int = 7,
+    folder: Path | None = None,
     progress: Progress = silent,
 ) -> ReportData:
-    """Render and measure what the report shows; the stages must have been run."""
+    """Render and measure what the report shows; the stages must have been run.
+
+    ``folder`` is where the report will lie, the shot's own by default.
+    """
     views = open_views(shot, forward=forward, up=up)
     chosen = expressive_frames(shot, frames)
     steps = (
@@ -61,7 +67,11 @@ def report_data(
         progress("making the report", done, len(steps))
     subtitle = f"{views.source.n_frames} frames at {views.fps:g} a second · {len(views.source.rest):,} vertices"
     return ReportData(
-        f"{views.target.label}: facial performance transfer", subtitle, _summary(shot), made, _links(shot)
+        f"{views.target.label}: facial performance transfer",
+        subtitle,
+        _summary(shot),
+        made,
+        result_links(shot, folder or shot.path),
     )
 
 
@@ -176,13 +186,14 @@ def _parameters(shot: Shot) -> Section:
     tables: dict[str, Any] = {}
     for stage in STAGES:
         tables |= (shot.manifest(stage) or {}).get("parameters", {})
-    return Section("Parameters", "As the stages last ran; change them in shot.toml.", numbers=tables)
+    return Section("Parameters", "As the stages last ran; change them in shot.toml.", numbers=tables, judged=False)
 
 
-def _links(shot: Shot) -> list[tuple[str, str]]:
-    """Whatever lies beside the report, by relative addresses, so that the folder can be moved as a whole."""
+def result_links(shot: Shot, folder: Path) -> list[tuple[str, str]]:
+    """What was made of the shot, by addresses relative to the report's folder, so that both can be moved together."""
     found: list[Path] = [shot.frames_path]
-    for folder in (shot.export_folder, shot.render_folder):
-        found += sorted(folder.iterdir()) if folder.is_dir() else []
-    relative = [path.relative_to(shot.path).as_posix() for path in found if path.exists()]
-    return [(name, name) for name in relative]
+    for made in (shot.export_folder, shot.render_folder):
+        found += sorted(made.iterdir()) if made.is_dir() else []
+    way = Path(os.path.relpath(shot.path.resolve(), folder.resolve()))
+    names = [path.relative_to(shot.path) for path in found if path.exists()]
+    return [(name.as_posix(), quote((way / name).as_posix())) for name in names]

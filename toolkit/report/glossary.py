@@ -68,6 +68,23 @@ GLOSSARY: tuple[Entry, ...] = (
         "height the eye sees it: give feature lines on both rims.",
     ),
     Entry(
+        r"stretched",
+        "Triangles of the skin whose area changed six times more, or less, than usual. A few at nostrils and ears are "
+        "common.",
+        good=0.005,
+        poor=0.02,
+        share=True,
+    ),
+    Entry(
+        r"accepted",
+        "How much of the skin found its place on the target; the rest follows its neighbours.",
+        share=True,
+    ),
+    Entry(
+        r"misfit",
+        "How unlike the two faces are: what is left between the landmarks after moving, turning and scaling.",
+    ),
+    Entry(
         r"crossing",
         "Triangles that run through each other, mostly at lips or lids. Watch these frames in the video.",
     ),

@@ -25,8 +25,13 @@ class NumberRow:
     verdict: str = ""
 
 
-def number_rows(numbers: Mapping[str, Any]) -> list[NumberRow]:
-    """Flatten nested numbers to rows, in order; nested names are joined, what is explained once is not repeated."""
+def number_rows(numbers: Mapping[str, Any], judged: bool = True) -> list[NumberRow]:
+    """Flatten nested numbers to rows, in order; nested names are joined, what is explained once is not repeated.
+
+    Settings are not ``judged``: a limit is not a finding.
+    """
+    if not judged:
+        return [NumberRow(_in_words(name), format_value(value)) for name, value in _leaves(numbers, "")]
     rows: list[NumberRow] = []
     told: set[str] = set()
     for name, value in _leaves(numbers, ""):
@@ -47,13 +52,18 @@ def format_value(value: Any, *, share: bool = False) -> str:
     if isinstance(value, (int, np.integer)):
         return f"{int(value):,}".replace(",", "\u202f")
     if isinstance(value, (float, np.floating)):
-        return f"{100 * value:.3g} %" if share and np.isfinite(value) else f"{value:.4g}"
+        return _percent(float(value)) if share and np.isfinite(value) else f"{value:.4g}"
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if isinstance(value, (list, tuple)):
         shown = ", ".join(format_value(item, share=share) for item in value[:_MOST_ITEMS])
-        return f"{shown}, … ({len(value)} in all)" if len(value) > _MOST_ITEMS else shown
+        return f"{shown}, … ({len(value)} in all)" if len(value) > _MOST_ITEMS else shown or "none"
     return str(value)
+
+
+def _percent(share: float) -> str:
+    """Below a ten-thousandth of a percent is rounding."""
+    return "0 %" if abs(share) < 1e-6 else f"{100 * share:.3g} %"
 
 
 def _leaves(numbers: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:
