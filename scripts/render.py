@@ -125,7 +125,7 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--frames", type=numbers_list, metavar="A,B,...", help="or exactly these frames")
     made.add_argument(
-        "--close-up", action="append", default=[], choices=["eyes", "mouth", "forehead"], help="repeatable"
+        "--close-up", action="append", default=[], choices=["features", "eyes", "mouth", "forehead"], help="repeatable"
     )
     made.add_argument("--map", action="append", default=[], choices=_MAPS, help="colour map, repeatable")
     made.add_argument("--video", action="store_true", help="also the side-by-side video")
