@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 from threadpoolctl import threadpool_limits
 
 from toolkit.progress import Progress, silent
@@ -35,14 +35,14 @@ def worker_count() -> int:
     return min(8, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1))
 
 
-def scratch(name: str, like: NDArray) -> NDArray:
-    """An array of that shape and type, with anything in it, which this thread gets again at the next call by that name.
+def scratch(name: str, shape: tuple[int, ...], dtype: DTypeLike = np.float32) -> NDArray:
+    """An array with anything in it, which this thread gets again at the next call by that name, shape and type.
 
     For what a block needs on the way only: new pages for every block take the system as long as a pass over them.
     """
     kept = getattr(_KEPT, name, None)
-    if kept is None or kept.shape != like.shape or kept.dtype != like.dtype:
-        kept = np.empty(like.shape, like.dtype)
+    if kept is None or kept.shape != shape or kept.dtype != dtype:
+        kept = np.empty(shape, dtype)
         setattr(_KEPT, name, kept)
     return kept
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.decomposition import Decomposer
-from toolkit.kernels import block_frames, rotate_details
+from toolkit.kernels import block_frames, opposite_edges, rotate_details
 from toolkit.mesh.patch import FramePatch
 
 __all__ = ["ChangedDetails", "DetailsChange"]
@@ -60,9 +60,7 @@ class ChangedDetails:
             change.apply_static(own, self._vertices)
         self._own_change = np.zeros((len(self._patch.ids), 3), dtype=np.float32)
         self._own_change[self._patch.at] = own - self._own
-        # Where the kernel finds the change of each vertex of the patch; what it finds for the others is not used.
-        self._order = np.zeros(len(self._patch.ids), dtype=np.int64)
-        self._order[self._patch.at] = np.arange(len(self._vertices))
+        self._stencil = (*opposite_edges(self._patch.triangles, len(self._patch.ids)), self._patch.neighbour)
         self._ones = np.ones(len(self._patch.ids), dtype=np.float32)
 
     def add(
@@ -85,7 +83,7 @@ class ChangedDetails:
             return
         here = points[self._patch.ids]
         if as_seen:
-            frames = block_frames(here, self._patch.triangles, self._patch.neighbour)[self._patch.at]
+            frames = block_frames(here, *self._stencil)[self._patch.at]
             plain = (np.einsum("vjib,vjb->bvi", frames, shift[self._rows]) - self._own).astype(np.float32)
         else:
             plain = details[:, self._vertices] * self._gain
@@ -93,16 +91,7 @@ class ChangedDetails:
         for change in acting:
             change.apply(changed, start, self._vertices)
         changed -= plain
-        added = np.empty_like(here)
-        rotate_details(
-            here,
-            self._patch.triangles,
-            self._patch.neighbour,
-            np.empty_like(here),
-            changed,
-            self._order,
-            self._ones,
-            self._own_change,
-            added,
-        )
+        block, added = np.zeros_like(here), np.empty_like(here)
+        block[self._patch.at] = np.moveaxis(changed, 0, 2)
+        rotate_details(here, *self._stencil, block, self._ones, self._own_change, added)
         shift[self._rows] += added[self._patch.at]

@@ -6,8 +6,6 @@ so that users can compare it with the displacement form on their own faces.
 
 from __future__ import annotations
 
-from threading import Lock
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -53,7 +51,6 @@ class CoatingDetails:
         self._laplacian = sp.csr_matrix(sp.identity(n) - sp.diags(1 / degree) @ adjacency)
         self._factor = factorise(sp.csc_matrix(sp.diags((1 + screening) * degree) - adjacency))
         self._weights, self._screening = degree, screening
-        self._lock = Lock()
         self._source, self._target, self._order = source, target, order
         self._smooth_deltas, self._details, self._gain = smooth_deltas, details, np.asarray(gain)[order]
         self._source_rest = self._local_coating(
@@ -71,8 +68,7 @@ class CoatingDetails:
         coating = self._apply(self._laplacian, np.einsum("vijb,vj->vib", frames, own))
         coating += np.einsum("vijb,vjb->vib", frames, self._gain[:, None, None] * change)
         right = self._weights[:, None, None] * (coating + self._screening * rotated)
-        with self._lock:  # blocks run on threads, and one factor's work space is shared
-            solved = self._factor.solve(right.reshape(len(right), -1))
+        solved = self._factor.solve(right.reshape(len(right), -1))
         return solved.reshape(right.shape).astype(np.float32)
 
     def _blocked(self, frames: NDArray[np.float32]) -> Array:
@@ -80,7 +76,7 @@ class CoatingDetails:
 
     def _frames(self, decomposer: Decomposer, points: Array) -> Array:
         """Local frames ``(V, 3, 3, B)``."""
-        return block_frames(points, decomposer.block.triangles, decomposer.block.neighbour)
+        return block_frames(points, *decomposer.block.stencil)
 
     def _local_coating(self, decomposer: Decomposer, points: Array, detail: Array) -> Array:
         """``F^T L (F detail)``, ``(V, 3, B)``."""

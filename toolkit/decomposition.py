@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from toolkit.blocks import scratch
-from toolkit.kernels import block_to_frames, frames_to_block, take_details
+from toolkit.kernels import block_to_frames, frames_to_block, opposite_edges, take_details
 from toolkit.mesh.core import TriangleMesh
 from toolkit.mesh.geometry import local_frames, vertex_normals
 from toolkit.mesh.topology import connected_components, unique_edges, vertex_adjacency
@@ -75,9 +75,7 @@ class Decomposer:
         self.rest = RestShape(smooth, detail, np.asarray(neighbour, dtype=np.int64))
         self.block = BlockNumbering(self.filter, mesh.triangles, neighbour)
         order = self.filter.order
-        self._origin = smooth.mean(axis=0)
-        self._rest = np.ascontiguousarray(mesh.vertices[order])
-        self._smooth32 = (smooth - self._origin)[order].astype(np.float32)
+        self._smooth32 = (smooth - smooth.mean(axis=0))[order].astype(np.float32)
         self._offset32 = (mesh.vertices - smooth)[order].astype(np.float32)
         self._detail32 = detail[order].astype(np.float32)
 
@@ -86,38 +84,33 @@ class Decomposer:
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Frames ``(B, V, 3)`` from ``start`` on -> smoothed deltas ``S~_t - S~_0`` and motion details, ``(V, 3, B)``.
 
-        Deltas are small, so float32 costs 1e-7 of the motion, not of the position.
+        Deltas are small, so float32 costs 1e-7 of the motion, not of the position. Both arrays are this thread's
+        scratch: its next block takes their place.
         """
-        stop = start + len(frames)
-        details = np.empty((self.mesh.n_vertices, 3, len(frames)), dtype=np.float32)
-        delta = scratch("deltas", details)
-        frames_to_block(
-            frames,
-            self.filter.order,
-            motion.rotations[start:stop],
-            motion.translations[start:stop],
-            self._rest,
-            delta,
-        )
-        smooth = self.filter.smooth_block(delta)
-        points = np.add(smooth, self._smooth32[:, :, None], out=scratch("points", smooth))
-        block, normals = self.block, scratch("normals", points)
-        own, local = self._offset32, self._detail32
-        take_details(points, block.triangles, block.neighbour, normals, smooth, delta, own, local, details)
+        shape = (self.mesh.n_vertices, 3, len(frames))
+        delta, smooth, points, details = (scratch(f"block {k}", shape) for k in range(4))
+        rotations, translations = (x[start : start + len(frames)] for x in (motion.rotations, motion.translations))
+        # The inverse of a rotation is its transpose.
+        turns, shifts = np.ascontiguousarray(rotations.T), np.einsum("bik,bi->kb", rotations, translations)
+        frames_to_block(frames, self.filter.position, turns, shifts, self.mesh.vertices, delta)
+        self.filter.smooth_block(delta, out=smooth)
+        np.add(smooth, self._smooth32[:, :, None], out=points)
+        take_details(points, *self.block.stencil, smooth, delta, self._offset32, self._detail32, details)
         return smooth, details
 
 
 class BlockNumbering:
-    """Triangles and frame neighbours in the numbering that blocks are kept in."""
+    """Triangles and frame neighbours in the numbering that blocks are kept in.
+
+    ``stencil`` is what compiled loops make local frames from: `opposite_edges` and the neighbours.
+    """
 
     def __init__(
         self, filter_: SmoothingFilter, triangles: NDArray[np.integer], neighbour: NDArray[np.integer]
     ) -> None:
-        position = filter_.position.astype(np.int32)
-        renumbered = position[triangles]
-        # In the order of their vertices, so that the scattered additions stay in the cache.
-        self.triangles = np.ascontiguousarray(renumbered[np.argsort(renumbered.min(axis=1), kind="stable")])
-        self.neighbour = np.ascontiguousarray(position[np.asarray(neighbour)[filter_.order]])
+        self.triangles = filter_.position.astype(np.int32)[triangles]
+        self.neighbour = filter_.position[np.asarray(neighbour)[filter_.order]]
+        self.stencil = (*opposite_edges(self.triangles, len(neighbour)), self.neighbour)
 
 
 def decompose_block(
@@ -130,7 +123,8 @@ def decompose_block(
     details: NDArray[np.float32],
 ) -> None:
     """Decompose frames ``start <= t < stop`` into ``smooth_deltas`` and ``details``, both ``(B, V, 3)`` float32."""
-    smooth, detail = decomposer.decompose(sequence.read(start, stop), motion, start)
+    frames = sequence.read(start, stop, out=scratch("frames", smooth_deltas.shape))
+    smooth, detail = decomposer.decompose(frames, motion, start)
     block_to_frames(smooth, decomposer.filter.position, smooth_deltas)
     block_to_frames(detail, decomposer.filter.position, details)
 

@@ -20,7 +20,7 @@ from toolkit.changed_details import ChangedDetails, DetailsChange
 from toolkit.coating_details import CoatingDetails
 from toolkit.decomposition import Decomposer
 from toolkit.errors import InputError
-from toolkit.kernels import place_frames, rotate_details
+from toolkit.kernels import place_frames, renumber_frames, rotate_details
 from toolkit.mesh.geometry import vertex_areas
 from toolkit.operators import neighbour_average
 from toolkit.rigid import Similarity
@@ -110,14 +110,14 @@ class Reconstruction:
         self._target, self._order, self._coating = target, order, coating
         self._weights = np.asarray(weights, dtype=np.float32)
         smooth = target.rest.smooth
-        self._origin = smooth.mean(axis=0)
-        self._rest = (smooth - self._origin)[order].astype(np.float32)
+        origin = smooth.mean(axis=0)
+        self._rest = (smooth - origin)[order].astype(np.float32)
         self._moves = np.empty((smooth.size, len(bases)), dtype=np.float32)
         for k, basis in enumerate(bases):
             self._moves[:, k] = (basis - smooth)[order].ravel()
         self._own = target.rest.detail[order].astype(np.float32)
         self._gain = np.asarray(gain, dtype=np.float32)[order]
-        self._turns, self._translations = _placed(motion, pose, self._origin)
+        self._turns, self._starts = _placed(motion, pose, origin)
         self._bases_changes: tuple[BasesChange, ...] = ()
         self._changed_details: ChangedDetails | None = None
         # Responses in the blocks' numbering; while an edit is dragged they stay the same from solve to solve.
@@ -145,8 +145,8 @@ class Reconstruction:
         """Write frames ``start <= t < stop`` to ``out`` (B, V, 3), from the source's motion details (B, V, 3)."""
         points = self._large_scale(start, stop)
         shift = self._detail_shift(points, details, start, stop)
-        turns, translations = self._turns[start:stop], self._translations[start:stop]
-        place_frames(points, shift, self._target.filter.position, turns, translations, out)
+        turns, starts = (np.ascontiguousarray(x[..., start:stop]) for x in (self._turns, self._starts))
+        place_frames(points, shift, self._target.filter.position, turns, starts, out)
 
     def detail_offsets(self, frame: int, details: NDArray[np.float32]) -> NDArray[np.float32]:
         """What details add to the large-scale shape of a frame, before the head's motion, ``(V, 3)``.
@@ -161,7 +161,8 @@ class Reconstruction:
     def _large_scale(self, start: int, stop: int) -> NDArray[np.float32]:
         """``T~_t`` about the origin, ``(V, 3, B)``."""
         weights = self._weights[start:stop]
-        points = (self._moves @ weights.T).reshape(len(self._order), 3, len(weights))
+        points = scratch("points", (len(self._order), 3, len(weights)))
+        np.matmul(self._moves, weights.T, out=points.reshape(-1, len(weights)))
         points += self._rest[:, :, None]
         for change in self._bases_changes:
             share = np.einsum("tk,ukc->uct", weights, change.coefficients).astype(np.float32)
@@ -173,10 +174,9 @@ class Reconstruction:
         self, points: NDArray[np.float32], details: NDArray[np.float32], start: int, stop: int
     ) -> NDArray[np.float32]:
         """What details add to the large-scale ``points``, edits included, ``(V, 3, B)``."""
-        shift = np.empty_like(points)
-        block, normals = self._target.block, scratch("normals", points)
-        faces, neighbour, order = block.triangles, block.neighbour, self._order
-        rotate_details(points, faces, neighbour, normals, details, order, self._gain, self._own, shift)
+        shift, block = scratch("shift", points.shape), scratch("details", points.shape)
+        renumber_frames(details, self._target.filter.position, block)
+        rotate_details(points, *self._target.block.stencil, block, self._gain, self._own, shift)
         if self._coating is not None:
             shift = self._coating.displacement(points, shift, start, stop)
         if self._changed_details is not None:
@@ -211,11 +211,11 @@ def local_size_ratio(source: Array, target: Array, triangles: NDArray[np.integer
 
 
 def _placed(motion: HeadMotion, pose: Similarity, origin: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Scaled rotations and translations that take centred, stabilised points to the target's own place, by frame."""
+    """Scaled rotations (3, 3, T) and what is added (3, T): centred, stabilised points to the target's own place."""
     moved = motion.rotations @ origin + motion.translations
     turns = pose.scale * (pose.rotation @ motion.rotations)
-    translations = pose.scale * moved @ pose.rotation.T + pose.translation
-    return turns.astype(np.float32), translations.astype(np.float32)
+    starts = pose.scale * moved @ pose.rotation.T + pose.translation
+    return np.moveaxis(turns, 0, 2).astype(np.float32), starts.T.astype(np.float32)
 
 
 def detail_gain(parameters: DetailParameters, source: Array, target: Array, triangles: NDArray[np.integer]) -> Array:

@@ -18,7 +18,9 @@ __all__ = [
     "edge_frames",
     "frames_to_block",
     "keep_largest_change",
+    "opposite_edges",
     "place_frames",
+    "renumber_frames",
     "rotate_details",
     "take_details",
 ]
@@ -32,33 +34,53 @@ _TILE = 64
 
 
 @njit(**_OPTIONS)
-def frames_to_block(frames, order, rotations, translations, rest, out):
-    """Undo each frame's rigid motion, renumber and subtract the rest: ``out[v, :, b] = R_b^T (x_b - t_b) - rest``.
+def _frames_to_tile(frames, first, last, tile):
+    """``tile[v - first, :, b] = frames[b, v]`` for vertices ``first <= v < last``."""
+    for b in range(frames.shape[0]):
+        for v in range(first, last):
+            for k in range(3):
+                tile[v - first, k, b] = frames[b, v, k]
 
-    ``frames`` (B, V, 3), ``order`` (V,) old ids in new order, ``rotations`` (B, 3, 3) and ``translations`` (B, 3) of
-    the head, ``rest`` (V, 3) renumbered, ``out`` (V, 3, B). In float64 up to the difference.
-    """
-    n_frames, n_vertices = frames.shape[0], frames.shape[1]
-    turn, shift, x = np.zeros((3, 3, n_frames)), np.zeros((3, n_frames)), np.empty((3, n_frames))
-    for b in range(n_frames):
-        for k in range(3):
-            for i in range(3):
-                # The inverse of a rotation is its transpose.
-                turn[k, i, b] = rotations[b, i, k]
-                shift[k, b] += rotations[b, i, k] * translations[b, i]
-    for v in range(n_vertices):
-        old = order[v]
-        for b in range(n_frames):
-            for i in range(3):
-                x[i, b] = frames[b, old, i]
+
+@njit(**_ARITHMETIC)
+def _still_tile(tile, position, turns, shifts, rest, first, last, out):
+    for v in range(first, last):
+        x, p = tile[v - first], position[v]
         for k in range(3):
             place = rest[v, k]
-            for b in range(n_frames):
-                moved = turn[k, 0, b] * x[0, b] + turn[k, 1, b] * x[1, b] + turn[k, 2, b] * x[2, b]
-                out[v, k, b] = moved - (shift[k, b] + place)
+            for b in range(out.shape[2]):
+                moved = turns[k, 0, b] * x[0, b] + turns[k, 1, b] * x[1, b] + turns[k, 2, b] * x[2, b]
+                out[p, k, b] = moved - (shifts[k, b] + place)
 
 
 @njit(**_OPTIONS)
+def frames_to_block(frames, position, turns, shifts, rest, out):
+    """Move, renumber and subtract the rest: ``out[position[v], :, b] = turns_b frames[b, v] - shifts_b - rest[v]``.
+
+    ``frames`` (B, V, 3), ``turns`` (3, 3, B), ``shifts`` (3, B), ``rest`` (V, 3), ``out`` (V, 3, B). In float64 up to
+    the difference.
+    """
+    n_vertices = frames.shape[1]
+    tile = np.empty((_TILE, 3, frames.shape[0]), frames.dtype)
+    for first in range(0, n_vertices, _TILE):
+        last = min(n_vertices, first + _TILE)
+        _frames_to_tile(frames, first, last, tile)
+        _still_tile(tile, position, turns, shifts, rest, first, last, out)
+
+
+@njit(**_ARITHMETIC)
+def renumber_frames(frames, position, out):
+    """Make a block ``(V, 3, B)`` of frames (B, V, 3) as they are: ``out[position[v], :, b] = frames[b, v]``."""
+    n_vertices = frames.shape[1]
+    for first in range(0, n_vertices, _TILE):
+        last = min(n_vertices, first + _TILE)
+        for b in range(frames.shape[0]):
+            for v in range(first, last):
+                for k in range(3):
+                    out[position[v], k, b] = frames[b, v, k]
+
+
+@njit(**_ARITHMETIC)
 def block_to_frames(block, position, out):
     """Give a block ``(V, 3, B)`` its original numbering back: ``out[b, v] = block[position[v], :, b]``."""
     n_vertices, _, n_frames = block.shape
@@ -70,23 +92,40 @@ def block_to_frames(block, position, out):
                     out[b, v, k] = block[position[v], k, b]
 
 
-@njit(**_OPTIONS)
-def place_frames(points, shift, position, turns, translations, out):
-    """Sum, move and renumber: ``out[b, v] = turns_b (points + shift)[position[v], :, b] + translations_b``.
+@njit(**_ARITHMETIC)
+def _placed_tile(points, shift, position, turns, starts, first, last, tile):
+    for v in range(first, last):
+        p = position[v]
+        for k in range(3):
+            for b in range(points.shape[2]):
+                x, y, z = (
+                    points[p, 0, b] + shift[p, 0, b],
+                    points[p, 1, b] + shift[p, 1, b],
+                    points[p, 2, b] + shift[p, 2, b],
+                )
+                tile[v - first, k, b] = turns[k, 0, b] * x + turns[k, 1, b] * y + turns[k, 2, b] * z + starts[k, b]
 
-    ``points`` and ``shift`` (V, 3, B), ``turns`` (B, 3, 3) and ``translations`` (B, 3) float32, ``out`` (B, V, 3).
+
+@njit(**_OPTIONS)
+def _tile_to_frames(tile, first, last, frames):
+    for b in range(frames.shape[0]):
+        for v in range(first, last):
+            for k in range(3):
+                frames[b, v, k] = tile[v - first, k, b]
+
+
+@njit(**_OPTIONS)
+def place_frames(points, shift, position, turns, starts, out):
+    """Sum, move and renumber: ``out[b, v] = turns_b (points + shift)[position[v], :, b] + starts_b``.
+
+    ``points`` and ``shift`` (V, 3, B), ``turns`` (3, 3, B) and ``starts`` (3, B) float32, ``out`` (B, V, 3).
     """
     n_vertices, _, n_frames = points.shape
+    tile = np.empty((_TILE, 3, n_frames), points.dtype)
     for first in range(0, n_vertices, _TILE):
         last = min(n_vertices, first + _TILE)
-        for b in range(n_frames):
-            turn, start = turns[b], translations[b]
-            for v in range(first, last):
-                p = position[v]
-                x, y, z = points[p, 0, b], points[p, 1, b], points[p, 2, b]
-                x, y, z = x + shift[p, 0, b], y + shift[p, 1, b], z + shift[p, 2, b]
-                for k in range(3):
-                    out[b, v, k] = turn[k, 0] * x + turn[k, 1] * y + turn[k, 2] * z + start[k]
+        _placed_tile(points, shift, position, turns, starts, first, last, tile)
+        _tile_to_frames(tile, first, last, out)
 
 
 @njit(**_ARITHMETIC)
@@ -146,28 +185,39 @@ def chebyshev_of_average(starts, neighbours, share, own, coefficients, bandwidth
         done += steps
 
 
-@njit(**_ARITHMETIC)
-def _accumulate_normals(points, triangles, normals):
-    """Area-weighted normals (not normalised) of every vertex in every frame; all arrays ``(V, 3, B)``."""
-    normals[:] = 0
+@njit(**_OPTIONS)
+def opposite_edges(triangles, n_vertices):
+    """The edges opposite to each vertex in its triangles: those of vertex v are ``edges[starts[v] : starts[v + 1]]``.
+
+    ``starts`` (V + 1,) and ``edges`` (3F, 2), uint32; turned as their triangles are, and in their order.
+    """
+    starts, edges = np.zeros(n_vertices + 2, np.uint32), np.empty((3 * len(triangles), 2), np.uint32)
     for f in range(len(triangles)):
-        i, j, k = triangles[f, 0], triangles[f, 1], triangles[f, 2]
+        for k in range(3):
+            starts[triangles[f, k] + 2] += 1
+    for v in range(n_vertices):
+        starts[v + 2] += starts[v + 1]
+    for f in range(len(triangles)):
+        for k in range(3):
+            at = starts[triangles[f, k] + 1]
+            edges[at, 0], edges[at, 1] = triangles[f, (k + 1) % 3], triangles[f, (k + 2) % 3]
+            starts[triangles[f, k] + 1] = at + 1
+    return starts[:-1], edges
+
+
+@njit(**_ARITHMETIC)
+def _sum_normals(points, starts, edges, v, normal):
+    """Area-weighted normal (not normalised) of vertex ``v`` in every frame, to ``normal`` (3, B)."""
+    normal[:] = 0
+    for e in range(starts[v], starts[v + 1]):
+        i, j = edges[e, 0], edges[e, 1]
         for t in range(points.shape[2]):
-            ux, uy, uz = (
-                points[j, 0, t] - points[i, 0, t],
-                points[j, 1, t] - points[i, 1, t],
-                points[j, 2, t] - points[i, 2, t],
-            )
-            vx, vy, vz = (
-                points[k, 0, t] - points[i, 0, t],
-                points[k, 1, t] - points[i, 1, t],
-                points[k, 2, t] - points[i, 2, t],
-            )
-            x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-            for v in (i, j, k):
-                normals[v, 0, t] += x
-                normals[v, 1, t] += y
-                normals[v, 2, t] += z
+            px, py, pz = points[v, 0, t], points[v, 1, t], points[v, 2, t]
+            ux, uy, uz = points[i, 0, t] - px, points[i, 1, t] - py, points[i, 2, t] - pz
+            vx, vy, vz = points[j, 0, t] - px, points[j, 1, t] - py, points[j, 2, t] - pz
+            normal[0, t] += uy * vz - uz * vy
+            normal[1, t] += uz * vx - ux * vz
+            normal[2, t] += ux * vy - uy * vx
 
 
 @njit(forceinline=True, **_OPTIONS)
@@ -178,9 +228,9 @@ def _unit(x, y, z):
 
 
 @njit(forceinline=True, **_OPTIONS)
-def _local_frame(points, normals, v, w, t):
+def _local_frame(points, normal, v, w, t):
     """Tangent, towards the neighbour ``w``, bitangent and normal of vertex ``v`` in frame ``t``: nine numbers."""
-    nx, ny, nz = _unit(normals[v, 0, t], normals[v, 1, t], normals[v, 2, t])
+    nx, ny, nz = _unit(normal[0, t], normal[1, t], normal[2, t])
     tx, ty, tz = points[w, 0, t] - points[v, 0, t], points[w, 1, t] - points[v, 1, t], points[w, 2, t] - points[v, 2, t]
     along = tx * nx + ty * ny + tz * nz
     tx, ty, tz = _unit(tx - along * nx, ty - along * ny, tz - along * nz)
@@ -188,20 +238,21 @@ def _local_frame(points, normals, v, w, t):
 
 
 @njit(**_ARITHMETIC)
-def take_details(points, triangles, neighbour, normals, smooth, delta, rest_offset, rest_detail, out):
+def take_details(points, starts, edges, neighbour, smooth, delta, rest_offset, rest_detail, out):
     """Turn deltas into motion details, ``d = F^T (delta - smooth + rest_offset) - e_0`` (method 3, Eq. 3).
 
     ``points`` (V, 3, B) are smoothed, ``smooth`` and ``delta`` (V, 3, B) the smoothed and the full change since rest,
-    ``rest_offset`` and ``rest_detail`` (V, 3) the rest shape's detail, plain and in its local frames; ``normals``
-    (V, 3, B) is scratch.
+    ``rest_offset`` and ``rest_detail`` (V, 3) the rest shape's detail, plain and in its local frames; ``starts`` and
+    ``edges`` are the mesh's `opposite_edges`.
     """
-    _accumulate_normals(points, triangles, normals)
+    normal = np.empty(points.shape[1:], points.dtype)
     for v in range(len(points)):
+        _sum_normals(points, starts, edges, v, normal)
         w = neighbour[v]
         ox, oy, oz = rest_offset[v, 0], rest_offset[v, 1], rest_offset[v, 2]
         ex, ey, ez = rest_detail[v, 0], rest_detail[v, 1], rest_detail[v, 2]
         for t in range(points.shape[2]):
-            tx, ty, tz, bx, by, bz, nx, ny, nz = _local_frame(points, normals, v, w, t)
+            tx, ty, tz, bx, by, bz, nx, ny, nz = _local_frame(points, normal, v, w, t)
             x = delta[v, 0, t] - smooth[v, 0, t] + ox
             y = delta[v, 1, t] - smooth[v, 1, t] + oy
             z = delta[v, 2, t] - smooth[v, 2, t] + oz
@@ -211,34 +262,35 @@ def take_details(points, triangles, neighbour, normals, smooth, delta, rest_offs
 
 
 @njit(**_ARITHMETIC)
-def rotate_details(points, triangles, neighbour, normals, details, order, gain, rest_detail, out):
+def rotate_details(points, starts, edges, neighbour, details, gain, rest_detail, out):
     """Turn local details into displacements of the frame: ``out = F (e_0 + gain d)`` (method 7, Eqs. 5 and 16).
 
-    ``points`` and ``out`` (V, 3, B); ``details`` (B, V, 3) in the original numbering, ``order`` (V,) old ids in new
-    order; ``gain`` (V,), ``rest_detail`` (V, 3); ``normals`` is scratch.
+    ``points``, ``details`` and ``out`` (V, 3, B); ``gain`` (V,), ``rest_detail`` (V, 3); ``starts`` and ``edges`` are
+    the mesh's `opposite_edges`.
     """
-    _accumulate_normals(points, triangles, normals)
+    normal = np.empty(points.shape[1:], points.dtype)
     for v in range(len(points)):
-        w, old, g = neighbour[v], order[v], gain[v]
+        _sum_normals(points, starts, edges, v, normal)
+        w, g = neighbour[v], gain[v]
         ex, ey, ez = rest_detail[v, 0], rest_detail[v, 1], rest_detail[v, 2]
         for t in range(points.shape[2]):
-            tx, ty, tz, bx, by, bz, nx, ny, nz = _local_frame(points, normals, v, w, t)
-            x, y, z = g * details[t, old, 0] + ex, g * details[t, old, 1] + ey, g * details[t, old, 2] + ez
+            tx, ty, tz, bx, by, bz, nx, ny, nz = _local_frame(points, normal, v, w, t)
+            x, y, z = g * details[v, 0, t] + ex, g * details[v, 1, t] + ey, g * details[v, 2, t] + ez
             out[v, 0, t] = tx * x + bx * y + nx * z
             out[v, 1, t] = ty * x + by * y + ny * z
             out[v, 2, t] = tz * x + bz * y + nz * z
 
 
 @njit(**_OPTIONS)
-def block_frames(points, triangles, neighbour):
+def block_frames(points, starts, edges, neighbour):
     """Local frames ``(V, 3, 3, B)`` of a block, columns (tangent, bitangent, normal); see `local_frames`."""
     n_vertices, _, n_frames = points.shape
-    normals = np.empty_like(points)
-    _accumulate_normals(points, triangles, normals)
+    normal = np.empty(points.shape[1:], points.dtype)
     frames = np.empty((n_vertices, 3, 3, n_frames), points.dtype)
     for v in range(n_vertices):
+        _sum_normals(points, starts, edges, v, normal)
         for t in range(n_frames):
-            columns = _local_frame(points, normals, v, neighbour[v], t)
+            columns = _local_frame(points, normal, v, neighbour[v], t)
             for k in range(3):
                 for i in range(3):
                     frames[v, i, k, t] = columns[3 * k + i]

@@ -129,14 +129,16 @@ class SmoothingFilter:
         result[self.order] = self.smooth_block(np.ascontiguousarray(values[self.order]))
         return result
 
-    def smooth_block(self, block: NDArray[np.floating]) -> NDArray[np.floating]:
-        """``M block`` for a contiguous block ``(V, ...)`` in the renumbered order; the block is left alone.
+    def smooth_block(
+        self, block: NDArray[np.floating], out: NDArray[np.floating] | None = None
+    ) -> NDArray[np.floating]:
+        """``M block`` for a contiguous block ``(V, ...)`` in the renumbered order, in ``out`` if that is given.
 
-        Rounding is that of the block's type: give small deltas, not positions, where float32 is used.
+        The block is left alone. Rounding is that of its type: give small deltas, not positions, where float32 is used.
         """
         coefficients = self._coefficients32 if block.dtype == np.float32 else self.coefficients
+        smooth = np.empty_like(block) if out is None else out
         flat = block.reshape(len(block), -1)
-        smooth = np.empty_like(flat)
         chebyshev_of_average(
             self._starts,
             self._neighbours,
@@ -146,10 +148,10 @@ class SmoothingFilter:
             self._bandwidth,
             _STEPS_TOGETHER,
             flat,
-            smooth,
-            scratch("smoothing", smooth),
+            smooth.reshape(flat.shape),
+            scratch("smoothing", flat.shape, flat.dtype),
         )
-        return smooth.reshape(block.shape)
+        return smooth
 
 
 @remembered

@@ -46,17 +46,25 @@ class FrameSequence:
     def __len__(self) -> int:
         return self.n_frames
 
-    def read(self, start: int, stop: int, vertices: NDArray[np.integer] | None = None) -> NDArray[np.float32]:
+    def read(
+        self,
+        start: int,
+        stop: int,
+        vertices: NDArray[np.integer] | None = None,
+        out: NDArray[np.float32] | None = None,
+    ) -> NDArray[np.float32]:
         """Return frames ``start <= t < stop`` as ``(stop - start, V, 3)`` float32, a copy of the caller's own.
 
-        With ``vertices`` (n,) only these, ``(stop - start, n, 3)``.
+        With ``vertices`` (n,) only these, ``(stop - start, n, 3)``; in ``out`` if that is given.
         """
         if not 0 <= start <= stop <= self.n_frames:
             raise IndexError(f"frames {start}:{stop} are outside 0:{self.n_frames} of {self.where}")
-        if start == stop:
-            return np.zeros((0, self.n_vertices if vertices is None else len(vertices), 3), dtype=np.float32)
-        block = self.read_block(start, stop)
-        return np.array(block if vertices is None else block[:, vertices], dtype=np.float32, order="C")
+        if out is None:
+            out = np.empty((stop - start, self.n_vertices if vertices is None else len(vertices), 3), dtype=np.float32)
+        if start < stop:
+            block = self.read_block(start, stop)
+            out[:] = block if vertices is None else block[:, vertices]
+        return out
 
     def blocks(self) -> Iterator[tuple[int, int]]:
         """Yield ``(start, stop)`` over all frames, in blocks of about 64 MB."""

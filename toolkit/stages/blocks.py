@@ -59,8 +59,9 @@ class StageBlocks:
         if fill is None:
             with _ONE_AT_A_TIME:
                 fill = _opened(self.opener, self.shot, self.folder)
+        shapes = [(stop - start, *array.shape[1:]) for array in self._maps]
         blocks = [
-            scratch(f"stage {name}", array[start:stop]) for name, array in zip(self.arrays, self._maps, strict=True)
+            scratch(f"stage {k}", shape, a.dtype) for k, (shape, a) in enumerate(zip(shapes, self._maps, strict=True))
         ]
         fill(start, stop, *blocks)
         for array, block in zip(self._maps, blocks, strict=True):

@@ -51,13 +51,13 @@ STAGES: dict[str, Stage] = {
             ("inputs",),
             ("stabilise", "smoothing"),
             decompose.work,
-            version=5,
+            version=6,
             by_frames=True,
             reads=("source_vertices.npy", "source_triangles.npy"),
         ),
         Stage("bases", ("inputs", "decompose"), ("bases",), bases.work, version=3, reads=("lines.json",)),
         Stage("transfer", ("register", "bases"), ("smoothing", "transfer", "details"), transfer.work, version=2),
-        Stage("result", ("transfer",), ("smoothing", "details"), result.work, version=3, by_frames=True),
+        Stage("result", ("transfer",), ("smoothing", "details"), result.work, version=4, by_frames=True),
     )
 }
 
