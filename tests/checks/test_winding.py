@@ -21,7 +21,7 @@ def test_flips_undo_random_turning_up_to_the_smaller_side(head_with_eyes, seed):
     mended = np.where(flips[:, None], triangles[:, [0, 2, 1]], triangles)
     assert edge_table(mended, mesh.n_vertices).neighbour_faces()[2].all()
     # Within a part, either all turned faces are turned back or all others are turned too.
-    parts = table.parts()[triangles[:, 0]]
+    parts = table.parts[triangles[:, 0]]
     for part in np.unique(parts):
         assert len(set((flips ^ turned)[parts == part])) == 1
 
@@ -33,8 +33,18 @@ def test_edge_table_agrees_with_counting(bump):
         for k in range(3):
             faces_of.setdefault(frozenset((triangle[k], triangle[(k + 1) % 3])), set()).add(face)
     assert len(table.edges) == len(faces_of)
+    assert table.edges.tolist() == sorted(sorted(edge) for edge in faces_of)
     for row, edge in enumerate(table.edges.tolist()):
         assert set(table.faces_of(row).tolist()) == faces_of[frozenset(edge)]
+
+
+def test_edge_table_knows_which_way_faces_run():
+    """Two faces agree across 0-1, two run the same way along 1-2, and 0-2 is left by one and crowded by none."""
+    table = edge_table(np.array([[0, 1, 2], [1, 0, 3], [1, 2, 4]]), 6)
+    found = dict(zip(map(tuple, table.edges.tolist()), table.balance.tolist(), strict=True))
+    assert found == {(0, 1): 0, (0, 2): -1, (0, 3): 1, (1, 2): 2, (1, 3): -1, (1, 4): -1, (2, 4): 1}
+    assert len(set(table.parts[:5])) == 1
+    assert table.parts[5] != table.parts[0]
 
 
 def test_volume_of_a_ball_and_of_its_inverse(ball):

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from toolkit.mesh.topology import directed_edges
+from toolkit.remembered import remembered
 
 __all__ = ["EdgeTable", "edge_table"]
 
-Ids = NDArray[np.int64]
+Ids = NDArray[np.int32]
 
 
 @dataclass(frozen=True)
@@ -46,21 +47,41 @@ class EdgeTable:
         start = self.first[two]
         return self.faces[start], self.faces[start + 1], self.balance[two] == 0
 
-    def parts(self) -> NDArray[np.int32]:
+    @cached_property
+    def parts(self) -> Ids:
         """Label ``(V,)`` of the connected part of each vertex; a lone vertex is a part of its own."""
-        i, j = self.edges.T
-        graph = sp.csr_matrix((np.ones(len(i), dtype=np.int8), (i, j)), shape=(self.n_vertices, self.n_vertices))
-        return connected_components(graph, directed=False)[1]
+        starts = np.searchsorted(self.edges[:, 0], np.arange(self.n_vertices + 1))
+        shape = (self.n_vertices, self.n_vertices)
+        graph = sp.csr_matrix((np.ones(len(self.edges), dtype=np.int8), self.edges[:, 1], starts), shape=shape)
+        labels: Ids = connected_components(graph, directed=False)[1]
+        return labels
 
 
+@remembered
 def edge_table(triangles: NDArray[np.integer], n_vertices: int) -> EdgeTable:
-    """Collect the edges of triangles ``(F, 3)`` whose corners are distinct and in range."""
-    directed = directed_edges(triangles)
-    low, high = np.minimum(*directed.T), np.maximum(*directed.T)
-    keys = low * n_vertices + high
-    order = np.argsort(keys, kind="stable")
-    unique, first, counts = np.unique(keys[order], return_index=True, return_counts=True)
-    upwards = np.where(directed[:, 0] < directed[:, 1], 1, -1)[order]
-    balance = np.add.reduceat(upwards, first) if len(first) else np.zeros(0, dtype=np.int64)
-    edges = np.stack([unique // max(n_vertices, 1), unique % max(n_vertices, 1)], axis=1)
+    """Collect the edges of triangles ``(F, 3)`` whose corners are distinct and in range.
+
+    Every check and repair of a mesh asks for it, and a target may have the source's triangles: it is kept.
+    """
+    corners = np.ascontiguousarray(np.asarray(triangles, dtype=np.int32).T)
+    start, end = corners.ravel(), corners[[1, 2, 0]].ravel()
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    order = _sorting(high, n_vertices)
+    order = order[_sorting(low[order], n_vertices)]
+    low, high = low[order], high[order]
+    fresh = np.ones(len(order), dtype=bool)
+    fresh[1:] = (low[1:] != low[:-1]) | (high[1:] != high[:-1])
+    first = np.flatnonzero(fresh).astype(np.int32)
+    upwards = np.where(start < end, 1, -1).astype(np.int32)[order]
+    balance = np.add.reduceat(upwards, first) if len(first) else upwards
+    edges = np.stack([low[first], high[first]], axis=1)
+    counts = np.diff(first, append=np.int32(len(order)))
     return EdgeTable(n_vertices, edges, counts, balance, first, order % max(len(triangles), 1))
+
+
+def _sorting(keys: Ids, n_keys: int) -> Ids:
+    """Stable order of keys ``0 <= k < n_keys``: a transposed matrix has its entries sorted, in linear time."""
+    n = len(keys)
+    matrix = sp.csr_matrix((np.ones(n, dtype=np.int8), keys, np.arange(n + 1)), shape=(n, n_keys))
+    order: Ids = matrix.tocsc().indices
+    return order

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from toolkit.checks.edges import EdgeTable, edge_table
 from toolkit.checks.findings import Finding, and_more
+from toolkit.checks.measures import flatness
 from toolkit.checks.winding import coherent_flips, is_inside_out
 from toolkit.mesh import TriangleMesh
 
@@ -62,20 +63,20 @@ def repeated_corners(triangles: NDArray[np.integer]) -> NDArray[np.bool_]:
 
 def flat_faces(vertices: NDArray[np.float64], triangles: NDArray[np.integer]) -> NDArray[np.bool_]:
     """Mask ``(F,)`` of the triangles whose least height is nothing beside the mesh (`FLAT`)."""
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    area = _length(np.cross(b - a, c - a))
-    longest = np.maximum(np.maximum(_length(b - a), _length(c - b)), _length(a - c))
-    return area <= FLAT * np.linalg.norm(np.ptp(vertices, axis=0)) * longest
+    return np.asarray(flatness(vertices, triangles) <= FLAT * np.linalg.norm(np.ptp(vertices, axis=0)))
 
 
 def duplicate_faces(triangles: NDArray[np.integer]) -> NDArray[np.bool_]:
     """Mask ``(F,)`` of the triangles whose three vertices an earlier triangle has too, in any order."""
-    ordered = np.sort(np.asarray(triangles), axis=1)
-    mask = np.ones(len(ordered), dtype=bool)
+    # Sums of one random number a vertex: only faces whose sums are alike can have the same vertices.
+    numbers = np.random.default_rng(0).integers(2**63, size=int(np.max(triangles, initial=-1)) + 1, dtype=np.uint64)
+    sums = numbers[triangles[:, 0]] + numbers[triangles[:, 1]] + numbers[triangles[:, 2]]
+    ordered_sums = np.sort(sums)
+    suspects = np.flatnonzero(np.isin(sums, ordered_sums[1:][ordered_sums[1:] == ordered_sums[:-1]]))
+    ordered = np.sort(triangles[suspects], axis=1)
     order = np.lexsort((*ordered.T[::-1],))
-    fresh = np.ones(len(order), dtype=bool)
-    fresh[1:] = (np.diff(ordered[order], axis=0) != 0).any(axis=1)
-    mask[order[fresh]] = False
+    mask = np.zeros(len(triangles), dtype=bool)
+    mask[suspects[order[1:]]] = (np.diff(ordered[order], axis=0) == 0).all(axis=1)
     return mask
 
 
@@ -89,10 +90,6 @@ def unused_vertices(triangles: NDArray[np.integer], n_vertices: int) -> NDArray[
 def is_soup(n_parts: int, n_triangles: int) -> bool:
     """Whether the faces share hardly any vertices, as in an STL file read as it stands."""
     return n_triangles > 8 and n_parts > SOUP * n_triangles
-
-
-def _length(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
 
 
 def unusable(mesh: TriangleMesh, where: object = "") -> list[Finding]:
@@ -183,7 +180,7 @@ def _crowded_edges(table: EdgeTable, face_ids: NDArray[np.int64], where: str) ->
 
 def _parts(table: EdgeTable, triangles: NDArray[np.integer], where: str) -> list[Finding]:
     used = ~unused_vertices(triangles, table.n_vertices)
-    _, sizes = np.unique(table.parts()[used], return_counts=True)
+    _, sizes = np.unique(table.parts[used], return_counts=True)
     if is_soup(len(sizes), len(triangles)):
         what = f"the mesh falls into {len(sizes)} separate parts, as its faces share no vertices"
         return [Finding("warning", what, where, None, "merge vertices by distance and export it again", "weld")]

@@ -83,7 +83,7 @@ def check_feature_lines(lines: Iterable[Line], mesh: TriangleMesh, where: object
     names = [line.name for line in lines]
     findings = _repeats("name", names, names, place, kind="feature lines")
     whole = mesh.triangles[~repeated_corners(mesh.triangles)]
-    parts = edge_table(whole, mesh.n_vertices).parts()
+    parts = edge_table(whole, mesh.n_vertices).parts
     for index, line in enumerate(lines):
         findings += _check_line(line, index, parts, place)
     return findings

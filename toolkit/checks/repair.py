@@ -83,7 +83,7 @@ def _clean_faces(mesh: TriangleMesh, notes: list[str]) -> NDArray[np.int32]:
 
 def _falls_apart(triangles: NDArray[np.int32], n_vertices: int) -> bool:
     used = ~unused_vertices(triangles, n_vertices)
-    return is_soup(len(np.unique(edge_table(triangles, n_vertices).parts()[used])), len(triangles))
+    return is_soup(len(np.unique(edge_table(triangles, n_vertices).parts[used])), len(triangles))
 
 
 def _rebuild(

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.checks.findings import Finding, and_more
+from toolkit.checks.measures import squared_lengths
 from toolkit.checks.scale import unit_guess
 from toolkit.errors import InputError
 from toolkit.mesh import TriangleMesh
@@ -58,11 +59,8 @@ def torn_edges(reference: NDArray[np.float64], positions: NDArray[np.float64], e
     corner of a mouth that opens.
     """
     before, after = _size(reference), _size(positions)
-    lengths = [
-        np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1) / size
-        for x, size in ((reference, before), (positions, after))
-    ]
-    return lengths[1] > np.maximum(10 * lengths[0], 0.1)
+    rest, moved = squared_lengths(reference, edges) / before**2, squared_lengths(positions, edges) / after**2
+    return np.asarray(moved > np.maximum(100 * rest, 0.01))
 
 
 def check_sequence(

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from toolkit.checks.edges import EdgeTable
+from toolkit.checks.measures import part_volumes
 from toolkit.mesh.geometry import triangle_areas
 
 __all__ = ["coherent_flips", "enclosed_volumes", "is_inside_out"]
@@ -49,24 +50,21 @@ def enclosed_volumes(
     Each border loop is closed by a fan round its middle, so a mask and a head without a neck have a volume too:
     positive where the faces look outwards, to the bulging side.
     """
-    parts = table.parts()
+    parts = table.parts
     count = int(parts.max(initial=-1)) + 1
-    of_face = parts[triangles[:, 0]]
-    vertices = vertices - _means(vertices, parts, count)[parts]  # about each part's middle, for the digits
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    volume = np.bincount(of_face, weights=np.einsum("ij,ij->i", a, normals) / 6, minlength=count)
-    area = np.bincount(of_face, weights=np.sqrt(np.einsum("ij,ij->i", normals, normals)) / 2, minlength=count)
+    middles = _means(vertices, parts, count)
+    volume, area = part_volumes(vertices, triangles, parts, middles)
 
     up = table.balance[table.counts == 1] > 0
     start, end = np.where(up[:, None], table.border, table.border[:, ::-1]).T
     if len(start):
+        starts, ends = (vertices[ids] - middles[parts[ids]] for ids in (start, end))
         border = sp.csr_matrix((np.ones(len(start)), (start, end)), shape=(len(vertices), len(vertices)))
         loop = connected_components(border, directed=False)[1]
-        centre = _means(vertices[start], loop[start], int(loop.max()) + 1)[loop[start]]
-        fans = np.einsum("ij,ij->i", vertices[end], np.cross(vertices[start], centre)) / 6
+        centre = _means(starts, loop[start], int(loop.max()) + 1)[loop[start]]
+        fans = np.einsum("ij,ij->i", ends, np.cross(starts, centre)) / 6
         volume = volume + np.bincount(parts[start], weights=fans, minlength=count)
-    return volume.astype(np.float64), area.astype(np.float64)
+    return volume, area
 
 
 def is_inside_out(vertices: NDArray[np.float64], triangles: NDArray[np.integer], table: EdgeTable) -> bool:
