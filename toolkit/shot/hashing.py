@@ -7,6 +7,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from xxhash import xxh3_128
+
 from toolkit.errors import InputError
 from toolkit.meshio.aside import written_aside
 
@@ -50,7 +52,7 @@ class HashCache:
         known = self._known.get(name)
         if known is not None and known[:2] == stamp:
             return str(known[2])
-        digest = hashlib.blake2b(digest_size=16)
+        digest = xxh3_128()  # against change, not against malice, and quick: a take may have gigabytes
         with path.open("rb") as file:
             while chunk := file.read(_CHUNK):
                 digest.update(chunk)
