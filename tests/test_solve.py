@@ -5,12 +5,12 @@ import pytest
 import scipy.sparse as sp
 
 from toolkit.mesh import TriangleMesh
-from toolkit.operators import gradient
+from toolkit.operators import uniform_laplacian
 from toolkit.solve import SingularMatrixError, factorise
 
 
 def _system(mesh: TriangleMesh) -> sp.csc_matrix:
-    rows = gradient(mesh.vertices, mesh.triangles)
+    rows = uniform_laplacian(mesh.triangles, mesh.n_vertices)
     return sp.csc_matrix(rows.T @ rows + 1e-3 * sp.identity(mesh.n_vertices))
 
 

@@ -15,9 +15,7 @@ __all__ = [
     "block_frames",
     "block_to_frames",
     "chebyshev_of_average",
-    "edge_frames",
     "frames_to_block",
-    "keep_largest_change",
     "opposite_edges",
     "place_frames",
     "renumber_frames",
@@ -295,41 +293,3 @@ def block_frames(points, starts, edges, neighbour):
                 for i in range(3):
                     frames[v, i, k, t] = columns[3 * k + i]
     return frames
-
-
-@njit(**_OPTIONS)
-def edge_frames(vertices, triangles, out):
-    """``[e0 e1 n]`` of every triangle, as columns, ``out`` (F, 3, 3); ``n = e0 x e1 / sqrt(|e0 x e1|)``."""
-    for f in range(len(triangles)):
-        _edge_frame(vertices, triangles, f, out[f])
-
-
-@njit(**_OPTIONS)
-def _edge_frame(vertices, triangles, f, out):
-    a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
-    for k in range(3):
-        out[k, 0], out[k, 1] = vertices[b, k] - vertices[a, k], vertices[c, k] - vertices[a, k]
-    squared = 0.0
-    for k in range(3):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        out[k, 2] = out[i, 0] * out[j, 1] - out[j, 0] * out[i, 1]
-        squared += out[k, 2] ** 2
-    root = np.sqrt(max(np.sqrt(squared), 1e-300))
-    for k in range(3):
-        out[k, 2] /= root
-
-
-@njit(**_OPTIONS)
-def keep_largest_change(vertices, triangles, inverse, largest):
-    """``largest <- max(largest, |[e0 e1 n] inverse - I|^2)`` (F,), Frobenius norm; ``inverse`` (F, 3, 3)."""
-    frame = np.empty((3, 3))
-    for f in range(len(triangles)):
-        _edge_frame(vertices, triangles, f, frame)
-        total = 0.0
-        for i in range(3):
-            for j in range(3):
-                change = -1.0 if i == j else 0.0
-                for k in range(3):
-                    change += frame[i, k] * inverse[f, k, j]
-                total += change**2
-        largest[f] = max(largest[f], total)

@@ -55,7 +55,7 @@ def transfer_bases(
     ``details`` (K, V, 3) are the source's motion details in the same frames, ``gain`` (V,) their factor,
     ``source_gaps`` (K, P, 3) the gaps of the visible source, ``contact_map`` what they become on the target.
     """
-    right = system.right_hand_sides(shapes, progress)
+    right = system.right_hand_sides(shapes)
     if not system.has_contacts or not len(shapes):
         return system.solve_for(right)
     ids = pairs.vertices
@@ -65,12 +65,14 @@ def transfer_bases(
     # Begin with the smoothed surfaces' own contacts; on the source itself that is the answer.
     smooth_change = pairs.gaps(shapes) - pairs.gaps(system.source)
     first_goals = pairs.gaps(system.target) + contact_map.change(smooth_change)
-    bases = system.solve_for(right + system.contact_forces(first_goals))
+    bases = system.solve_for(system.with_contacts(right, first_goals))
     goals = contact_map(source_gaps)
-    for _ in range(_ROUNDS):
+    for done in range(_ROUNDS):
+        progress("transferring bases", done, _ROUNDS)
         offsets = np.empty_like(goals)
         for k, basis in enumerate(bases):
             spread[ids] = local.displacement(basis, moved[k])
             offsets[k] = pairs.gaps(spread)
-        bases = system.solve_for(right + system.contact_forces(goals - offsets))
+        bases = system.solve_for(system.with_contacts(right, goals - offsets))
+    progress("transferring bases", _ROUNDS, _ROUNDS)
     return bases

@@ -17,16 +17,13 @@ from numpy.typing import NDArray
 
 from toolkit.contacts import ContactPairs
 from toolkit.errors import InputError
-from toolkit.kernels import edge_frames, keep_largest_change
+from toolkit.gradient_kernels import add_pulls, invert_edge_frames, largest_changes
 from toolkit.mesh.topology import connected_components
-from toolkit.operators import gradient
-from toolkit.progress import Progress, silent
 from toolkit.solve import Factor, factorise
 
 __all__ = [
     "DeformationTransfer",
     "TransferParameters",
-    "deformation_gradients",
     "line_gradients",
     "triangle_weights",
 ]
@@ -39,6 +36,8 @@ _PAPER_TRIANGLES = 160_000
 # A vertex that moves less than this share of the largest motion of any vertex holds its place.
 _STILL = 0.03
 _HOLD_WEIGHT = 1e-2
+# A triangle with less than this share of the median area has collapsed.
+_COLLAPSED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -93,22 +92,17 @@ class DeformationTransfer:
     ) -> None:
         parameters = parameters or TransferParameters()
         self.source, self.target, self.triangles = source, target, triangles
-        root = np.sqrt(weights) if weights is not None else np.ones(len(triangles))
-        self._gradient = sp.csr_matrix(sp.diags(np.repeat(root, 3)) @ gradient(target, triangles))
-        # G^T J^T = (G^T E^-T) E'^T: one sparse product a shape, and no gradient is ever formed.
-        inverse, _ = _inverse_edge_frames(source, triangles)
-        wanted = root[:, None, None] * inverse.transpose(0, 2, 1)
-        self._pull = sp.csr_matrix(self._gradient.T @ _block_diagonal(wanted))
-        self._pull_at_rest = self._pull @ _edge_frames(source, triangles).transpose(0, 2, 1).reshape(-1, 3)
+        self._inverse = _inverse_edge_frames(source, triangles)
+        # The gradients on the target are the first two rows of its inverses.
+        self._gradients = _inverse_edge_frames(target, triangles)
+        self._weights = weights if weights is not None else np.ones(len(triangles))
         self._edges = edges if edges is not None and parameters.feature_lines else np.zeros((0, 2), dtype=np.int64)
         self._pairs = pairs if pairs is not None and parameters.contacts and len(pairs) else None
-        blocks = [self._gradient]
-        blocks.append(self._line_rows(parameters))
-        blocks.append(self._contact_rows(parameters))
-        self._gauge, self._gauge_weight = _gauge_rows(target, triangles, motion)
-        blocks.append(sp.diags(self._gauge_weight) @ self._gauge)
+        self._held, self._hold = _gauge(target, triangles, motion)
+        hold = sp.csr_matrix((self._hold, (self._held, self._held)), shape=(len(target), len(target)))
+        rows = sp.vstack([self._line_rows(parameters), self._contact_rows(parameters)])
         self.matrix = sp.csc_matrix(
-            sum((rows.T @ rows for rows in blocks if rows.shape[0]), start=sp.csc_matrix((len(target), len(target))))
+            _stiffness(self._gradients, self._weights, triangles, len(target)) + rows.T @ rows + hold
         )
 
     @cached_property
@@ -126,68 +120,54 @@ class DeformationTransfer:
         if weight is None:
             weight = 100.0 if self._pairs is None else 10.0
         # Triangles grow with the square of the resolution, edges of a line with the resolution.
-        scaled = weight * np.sqrt(len(self.triangles) / _PAPER_TRIANGLES)
+        self._line_scale = np.sqrt(weight * np.sqrt(len(self.triangles) / _PAPER_TRIANGLES))
         vectors = self.target[self._edges[:, 1]] - self.target[self._edges[:, 0]]
-        self._line_length = np.maximum(np.sqrt(np.sum(vectors**2, axis=1)), 1e-30)
-        self._line_direction = vectors / self._line_length[:, None]
-        self._line_scale = np.full(len(self._edges), np.sqrt(scaled))
-        self._lines = _difference_rows(self._edges, self._line_scale / self._line_length, len(self.target))
+        length = np.maximum(np.sqrt(np.sum(vectors**2, axis=1)), 1e-30)
+        self._line_direction = vectors / length[:, None]
+        self._lines = _difference_rows(self._edges, self._line_scale / length, len(self.target))
         return self._lines
 
     def _contact_rows(self, parameters: TransferParameters) -> sp.csr_matrix:
         n = len(self.target)
         if self._pairs is None:
-            self._contacts = sp.csr_matrix((0, n))
-            self._contact_scale = 0.0
-            return self._contacts
+            return sp.csr_matrix((0, n))
         rim = self.target[self._pairs.edge[:, 1]] - self.target[self._pairs.edge[:, 0]]
         self._contact_scale = np.sqrt(parameters.contact_weight) / float(np.median(np.sqrt(np.sum(rim**2, axis=1))))
-        self._contacts = self._contact_scale * self._pairs.rows(n)
-        return self._contacts
+        rows = self._contact_scale * self._pairs.rows(n)
+        self._contacts = rows[:, self._pairs.vertices]
+        return rows
 
     def solve(self, shapes: NDArray[np.floating], goals: Array | None = None) -> Array:
         """Target shapes ``(K, V, 3)`` for source shapes ``(K, V, 3)``; ``goals`` (K, P, 3) the contact pairs' gaps."""
         right = self.right_hand_sides(shapes)
-        if goals is not None:
-            right += self.contact_forces(goals)
-        return self.solve_for(right)
+        return self.solve_for(right if goals is None else self.with_contacts(right, goals))
 
     def solve_for(self, right: Array) -> Array:
-        """Target shapes ``(K, V, 3)`` for right-hand sides ``(K, V, 3)``."""
-        columns = right.transpose(1, 0, 2).reshape(len(self.target), -1)
-        return self.target + self.factor.solve(columns).reshape(len(self.target), -1, 3).transpose(1, 0, 2)
+        """Target shapes ``(K, V, 3)`` for right-hand sides ``(V, 3, K)``."""
+        moves = self.factor.solve(right.reshape(len(right), -1)).reshape(right.shape)
+        moves += self.target[:, :, None]
+        return moves.transpose(2, 0, 1)
 
-    def right_hand_sides(self, shapes: NDArray[np.floating], progress: Progress = silent) -> Array:
-        """What the source shapes ``(K, V, 3)`` ask for, contacts aside, ``(K, V, 3)``."""
-        right = np.empty((len(shapes), len(self.target), 3))
-        for k, shape in enumerate(shapes):
-            right[k] = self._right_hand_side(np.asarray(shape, dtype=np.float64))
-            progress("transferring bases", k + 1, len(shapes))
+    def right_hand_sides(self, shapes: NDArray[np.floating]) -> Array:
+        """What the source shapes ``(K, V, 3)`` ask for, contacts aside, ``(V, 3, K)``."""
+        changes = _changes(shapes, self.source)
+        right = np.zeros_like(changes)
+        add_pulls(self.source, self._inverse, changes, self.triangles, self._gradients, self._weights, right)
+        if len(self._edges) and len(shapes):
+            turned = [line_gradients(self.source, shape, self._edges, self._line_direction) for shape in shapes]
+            goals = self._line_scale * _changes(np.stack(turned), self._line_direction)
+            right += (self._lines.T @ goals.reshape(len(goals), -1)).reshape(right.shape)
+        right[self._held] += self._hold[:, None, None] * changes[self._held]
         return right
 
-    def contact_forces(self, goals: Array) -> Array:
-        """What the contact pairs' gaps ``(K, P, 3)`` add to the right-hand sides, ``(K, V, 3)``."""
-        if self._pairs is None:
-            return np.zeros((len(goals), len(self.target), 3))
-        pull = self._contact_scale * (goals - self._pairs.gaps(self.target))
-        return np.stack([np.asarray(self._contacts.T @ one) for one in pull])
-
-    def _right_hand_side(self, shape: Array) -> Array:
-        spanned = _edge_frames(shape, self.triangles).transpose(0, 2, 1).reshape(-1, 3)
-        right = self._pull @ spanned - self._pull_at_rest
-        if len(self._edges):
-            turned = line_gradients(self.source, shape, self._edges, self._line_direction) - self._line_direction
-            right += self._lines.T @ (self._line_scale[:, None] * turned)
-        right += self._gauge.T @ (self._gauge_weight[:, None] ** 2 * (self._gauge @ (shape - self.source)))
-        return np.asarray(right)
-
-
-def deformation_gradients(rest: Array, shape: Array, triangles: NDArray[np.integer]) -> Array:
-    """``J_f`` (F, 3, 3) with ``J_f [e0 e1 n] = [e0' e1' n']``, ``n = e0 x e1 / sqrt(|e0 x e1|)`` (Eq. 10, Sumner)."""
-    inverse, flat = _inverse_edge_frames(rest, triangles)
-    gradients = np.asarray(_edge_frames(shape, triangles) @ inverse)
-    gradients[flat] = np.eye(3)
-    return gradients
+    def with_contacts(self, right: Array, goals: Array) -> Array:
+        """The right-hand sides ``(V, 3, K)`` with what the contact pairs' gaps ``(K, P, 3)`` add to them."""
+        right = right.copy()
+        if self._pairs is not None:
+            pull = self._contact_scale * _changes(goals, self._pairs.gaps(self.target))
+            forces = self._contacts.T @ pull.reshape(len(pull), -1)
+            right[self._pairs.vertices] += forces.reshape(-1, *right.shape[1:])
+        return right
 
 
 def triangle_weights(rest: Array, shapes: NDArray[np.floating], triangles: NDArray[np.integer]) -> Array:
@@ -197,33 +177,35 @@ def triangle_weights(rest: Array, shapes: NDArray[np.floating], triangles: NDArr
     to the source's own crease, not to the target's; counted in full it bends its surroundings, and as positions are
     sums of gradients, the whole head. On the samples' known answers this takes a third off the error of a blink.
     """
-    inverse, flat = _inverse_edge_frames(rest, triangles)
-    largest = np.zeros(len(triangles))
-    for shape in shapes:
-        keep_largest_change(np.asarray(shape, dtype=np.float64), triangles, inverse, largest)
-    return 1 / (1 + np.where(flat, 0, largest))
+    largest = np.empty(len(triangles))
+    largest_changes(rest, _inverse_edge_frames(rest, triangles), _changes(shapes, rest), triangles, largest)
+    return 1 / (1 + largest)
 
 
-def _inverse_edge_frames(vertices: Array, triangles: NDArray[np.integer]) -> tuple[Array, NDArray[np.bool_]]:
-    """Inverses ``(F, 3, 3)``, zero for collapsed triangles, which say nothing about the deformation; and which are."""
-    frames = _edge_frames(vertices, triangles)
-    e0, e1, n = (frames[:, :, k] for k in range(3))
-    rows = np.stack([np.cross(e1, n), np.cross(n, e0), np.cross(e0, e1)], axis=1)
-    determinant = np.sum(e0 * rows[:, 0], axis=1)
-    flat = np.abs(determinant) <= 1e-12 * np.maximum(np.abs(frames).max(axis=(1, 2)) ** 3, 1e-300)
-    scale = np.where(flat, 0, 1 / np.where(flat, 1, determinant))
-    return rows * scale[:, None, None], flat
+def _changes(shapes: NDArray[np.floating], rest: Array) -> Array:
+    """``shapes - rest`` for shapes (K, n, 3), the shapes innermost, ``(n, 3, K)``."""
+    changes = np.empty((*rest.shape, len(shapes)))
+    np.subtract(shapes.transpose(1, 2, 0), rest[:, :, None], out=changes)
+    return changes
 
 
-def _block_diagonal(blocks: Array) -> sp.bsr_matrix:
-    n = len(blocks)
-    return sp.bsr_matrix((blocks, np.arange(n), np.arange(n + 1)), shape=(3 * n, 3 * n))
+def _inverse_edge_frames(vertices: Array, triangles: NDArray[np.integer]) -> Array:
+    """Inverses ``(F, 3, 3)`` of ``[e0 e1 n]``; zero for collapsed triangles, which have neither gradient nor say."""
+    inverse, squared = np.empty((len(triangles), 3, 3)), np.empty(len(triangles))
+    invert_edge_frames(vertices, triangles, inverse, squared)
+    inverse[squared <= _COLLAPSED**2 * (np.median(squared) if len(squared) else 0)] = 0
+    return inverse
 
 
-def _edge_frames(vertices: Array, triangles: NDArray[np.integer]) -> Array:
-    frames = np.empty((len(triangles), 3, 3))
-    edge_frames(vertices, triangles, frames)
-    return frames
+def _stiffness(gradients: Array, weights: Array, triangles: NDArray[np.integer], n_vertices: int) -> sp.csr_matrix:
+    """``sum_f w_f (grad_f x)^2`` as a matrix ``(V, V)``: ``w_f g_i . g_j`` at both ends of every triangle's sides."""
+    g, h = gradients[:, 0], gradients[:, 1]
+    sides = [weights * np.einsum("fi,fi->f", one, other) for one, other in ((g, h), (h, -g - h), (-g - h, g))]
+    ends = np.asarray(triangles)[:, [1, 2, 2, 0, 0, 1]].T.reshape(3, 2, -1)
+    half = sp.coo_matrix((np.concatenate(sides), np.hstack(list(ends))), shape=(n_vertices, n_vertices)).tocsr()
+    across = half + half.T
+    # Constants have no gradient: every row sums to zero.
+    return sp.csr_matrix(across - sp.diags(np.asarray(across.sum(axis=1)).ravel()))
 
 
 def line_gradients(rest: Array, shape: Array, edges: Ids, vectors: Array) -> Array:
@@ -254,8 +236,8 @@ def _difference_rows(edges: Ids, scale: Array, n_vertices: int) -> sp.csr_matrix
     return sp.csr_matrix((values, (np.tile(rows, 2), cols)), shape=(len(edges), n_vertices))
 
 
-def _gauge_rows(target: Array, triangles: NDArray[np.integer], motion: Array) -> tuple[sp.csr_matrix, Array]:
-    """Rows that say where each component is, since gradients do not; and their weights.
+def _gauge(target: Array, triangles: NDArray[np.integer], motion: Array) -> tuple[Ids, Array]:
+    """Vertices (H,) that say where each component is, since gradients do not; and their weights (H,).
 
     Vertices that the source hardly moves are held softly; a component without any is held at its quietest vertex. In
     both cases the goal is the source's own displacement, which the caller applies.
@@ -273,5 +255,4 @@ def _gauge_rows(target: Array, triangles: NDArray[np.integer], motion: Array) ->
     strength = np.where(loose[labels[held]], 1.0, _HOLD_WEIGHT * stillness[held])
     corners = target[triangles]
     edge = float(np.median(np.sqrt(np.sum((corners[:, 1] - corners[:, 0]) ** 2, axis=1))))
-    rows = sp.csr_matrix((np.ones(len(held)), (np.arange(len(held)), held)), shape=(len(held), n))
-    return rows, np.sqrt(strength) / edge
+    return held, strength / edge**2

@@ -1,0 +1,118 @@
+"""Compiled loops over triangles for the transfer of deformation gradients (Sumner and Popovic 2004).
+
+``E = [e0 e1 n]`` are a triangle's edges from its first corner and ``n = e0 x e1 / sqrt(|e0 x e1|)``. Changes of shapes
+are ``(V, 3, K)``, the shapes innermost, so that the compiler vectorises over them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from toolkit.compiled import DisjointArrays, njit
+
+__all__ = ["add_pulls", "invert_edge_frames", "largest_changes"]
+
+_OPTIONS = {"cache": True, "nogil": True, "fastmath": {"contract"}, "boundscheck": False, "error_model": "numpy"}
+_ARITHMETIC = _OPTIONS | {"pipeline_class": DisjointArrays}
+
+
+@njit(**_OPTIONS)
+def invert_edge_frames(vertices, triangles, inverse, squared):
+    """``inverse`` (F, 3, 3) of ``E``, and ``squared`` (F,) of ``|e0 x e1|``; a zero there makes the inverse nonsense.
+
+    Its first two rows are also the gradients, on the triangle, of what is 1 at the second or the third corner.
+    """
+    for f in range(len(triangles)):
+        e, g, x, y, z = _edges(vertices, triangles, f)
+        square = x * x + y * y + z * z
+        for row, (u, v, w) in enumerate(
+            (
+                (g[1] * z - g[2] * y, g[2] * x - g[0] * z, g[0] * y - g[1] * x),
+                (y * e[2] - z * e[1], z * e[0] - x * e[2], x * e[1] - y * e[0]),
+            )
+        ):
+            inverse[f, row, 0], inverse[f, row, 1], inverse[f, row, 2] = u / square, v / square, w / square
+        root = square**0.75
+        inverse[f, 2, 0], inverse[f, 2, 1], inverse[f, 2, 2] = x / root, y / root, z / root
+        squared[f] = square
+
+
+@njit(forceinline=True, **_OPTIONS)
+def _edges(vertices, triangles, f):
+    """``e0``, ``e1`` and the three numbers of ``e0 x e1``."""
+    a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
+    e = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
+    g = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
+    return e, g, e[1] * g[2] - e[2] * g[1], e[2] * g[0] - e[0] * g[2], e[0] * g[1] - e[1] * g[0]
+
+
+@njit(**_ARITHMETIC)
+def _frame_changes(rest, changes, triangles, f, out):
+    """How the triangle's ``E`` changes in every shape, ``out`` (3, 3, K), its columns first."""
+    a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
+    e, g, x, y, z = _edges(rest, triangles, f)
+    scale = 1 / np.sqrt(np.sqrt(max(x * x + y * y + z * z, 1e-300)))
+    nx, ny, nz = x * scale, y * scale, z * scale
+    for k in range(changes.shape[2]):
+        x, y, z = changes[a, 0, k], changes[a, 1, k], changes[a, 2, k]
+        u, v, w = changes[b, 0, k] - x, changes[b, 1, k] - y, changes[b, 2, k] - z
+        p, q, r = changes[c, 0, k] - x, changes[c, 1, k] - y, changes[c, 2, k] - z
+        out[0, 0, k], out[0, 1, k], out[0, 2, k] = u, v, w
+        out[1, 0, k], out[1, 1, k], out[1, 2, k] = p, q, r
+        u, v, w, p, q, r = u + e[0], v + e[1], w + e[2], p + g[0], q + g[1], r + g[2]
+        x, y, z = v * r - w * q, w * p - u * r, u * q - v * p
+        scale = 1 / np.sqrt(np.sqrt(max(x * x + y * y + z * z, 1e-300)))
+        out[2, 0, k], out[2, 1, k], out[2, 2, k] = x * scale - nx, y * scale - ny, z * scale - nz
+
+
+@njit(**_OPTIONS)
+def largest_changes(rest, inverse, changes, triangles, out):
+    """``out`` (F,): the largest ``|J - I|^2`` of the shapes, Frobenius norm, ``J`` the deformation gradient."""
+    frame = np.empty((3, 3, changes.shape[2]))
+    for f in range(len(triangles)):
+        _frame_changes(rest, changes, triangles, f, frame)
+        out[f] = _largest(frame, inverse[f])
+
+
+@njit(**_ARITHMETIC)
+def _largest(frame, inverse):
+    largest = 0.0
+    for k in range(frame.shape[2]):
+        total = 0.0
+        for i in range(3):
+            for j in range(3):
+                entry = frame[0, i, k] * inverse[0, j] + frame[1, i, k] * inverse[1, j] + frame[2, i, k] * inverse[2, j]
+                total += entry * entry
+        largest = max(largest, total)
+    return largest
+
+
+@njit(**_OPTIONS)
+def add_pulls(rest, inverse, changes, triangles, gradients, weights, out):
+    """``out[i] += w_f (J_f - I) g_i`` for every corner i of every triangle, ``out`` (V, 3, K).
+
+    ``gradients`` (F, 3, 3): its first two rows are ``g`` of the second and the third corner; all three sum to zero.
+    """
+    frame = np.empty((3, 3, changes.shape[2]))
+    share = np.empty((2, 3))
+    for f in range(len(triangles)):
+        _frame_changes(rest, changes, triangles, f, frame)
+        for corner in range(2):
+            for m in range(3):
+                share[corner, m] = weights[f] * (
+                    inverse[f, m, 0] * gradients[f, corner, 0]
+                    + inverse[f, m, 1] * gradients[f, corner, 1]
+                    + inverse[f, m, 2] * gradients[f, corner, 2]
+                )
+        _scatter(frame, share, triangles[f, 0], triangles[f, 1], triangles[f, 2], out)
+
+
+@njit(**_ARITHMETIC)
+def _scatter(frame, share, a, b, c, out):
+    for i in range(3):
+        for k in range(frame.shape[2]):
+            p = frame[0, i, k] * share[0, 0] + frame[1, i, k] * share[0, 1] + frame[2, i, k] * share[0, 2]
+            q = frame[0, i, k] * share[1, 0] + frame[1, i, k] * share[1, 1] + frame[2, i, k] * share[1, 2]
+            out[b, i, k] += p
+            out[c, i, k] += q
+            out[a, i, k] -= p + q
