@@ -29,6 +29,16 @@ def test_the_polynomial_is_the_filter(bump: TriangleMesh, steps: int) -> None:
     assert np.abs(quick - slow).max() < 1e-9 * bump.diagonal
 
 
+@pytest.mark.parametrize("passes", [0, 1, 60])
+def test_averaging_is_so_many_passes(bump: TriangleMesh, passes: int) -> None:
+    average = smoothing_average(bump.triangles, bump.n_vertices)
+    slow = bump.vertices
+    for _ in range(passes):
+        slow = (slow + average @ slow) / 2
+    quick = SmoothingFilter(bump.triangles, bump.n_vertices, SmoothingParameters()).average(bump.vertices, passes)
+    assert np.abs(quick - slow).max() < 1e-10 * bump.diagonal
+
+
 def test_it_takes_a_third_of_the_passes() -> None:
     parameters = SmoothingParameters()
     triangles = np.array([[0, 1, 2]])

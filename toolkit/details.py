@@ -22,7 +22,6 @@ from toolkit.decomposition import Decomposer
 from toolkit.errors import InputError
 from toolkit.kernels import place_frames, renumber_frames, rotate_details
 from toolkit.mesh.geometry import vertex_areas
-from toolkit.operators import neighbour_average
 from toolkit.rigid import Similarity
 from toolkit.stabilisation import HeadMotion
 
@@ -195,16 +194,15 @@ class Reconstruction:
         return known[1]
 
 
-def local_size_ratio(source: Array, target: Array, triangles: NDArray[np.integer]) -> Array:
+def local_size_ratio(source: Array, target: Decomposer) -> Array:
     """``s`` (V,): the target's length over the source's at each vertex, from smoothed areas, between 1/3 and 3.
 
-    Wrinkles scaled by it keep their slope. Smoothed far beyond a wrinkle, since the ratio of single triangles is the
-    registration's noise.
+    ``source`` (V, 3) and the target's large-scale shape are of one size. Wrinkles scaled by ``s`` keep their slope.
+    Smoothed far beyond a wrinkle, since the ratio of single triangles is the registration's noise.
     """
-    average = neighbour_average(triangles, len(source))
-    areas = np.stack([vertex_areas(x, triangles) for x in (source, target)], axis=1)
-    for _ in range(_RATIO_SMOOTHING):
-        areas = 0.5 * (areas + average @ areas)
+    shapes = source, target.rest.smooth
+    areas = np.stack([vertex_areas(shape, target.mesh.triangles) for shape in shapes], axis=1)
+    areas = target.filter.average(areas, _RATIO_SMOOTHING)
     floor = 1e-12 * max(float(areas[:, 0].max()), 1e-300)
     areas = np.maximum(areas, floor)
     return np.clip(np.sqrt(areas[:, 1] / areas[:, 0]), 1 / 3, 3)
@@ -218,11 +216,12 @@ def _placed(motion: HeadMotion, pose: Similarity, origin: Array) -> tuple[NDArra
     return np.moveaxis(turns, 0, 2).astype(np.float32), starts.T.astype(np.float32)
 
 
-def detail_gain(parameters: DetailParameters, source: Array, target: Array, triangles: NDArray[np.integer]) -> Array:
+def detail_gain(parameters: DetailParameters, source: Array, target: Decomposer) -> Array:
     """Factor of the motion details for each vertex ``(V,)``: the user's gain times the size ratio.
 
-    Both faces are in the source's pose and size, so the global ratio is 1 here.
+    Both faces are in the source's pose and size, so the global ratio is 1 here. ``source`` (V, 3) is its large-scale
+    shape.
     """
     if parameters.scale == "global":
         return np.full(len(source), parameters.gain)
-    return parameters.gain * local_size_ratio(source, target, triangles)
+    return parameters.gain * local_size_ratio(source, target)

@@ -113,12 +113,13 @@ class SmoothingFilter:
         # Unsigned, since a compiled loop asks of every signed index whether it counts from the end.
         self._starts, self._neighbours = renumbered.indptr.astype(np.uint32), renumbered.indices.astype(np.uint32)
         count = np.diff(renumbered.indptr)
-        half = largest_eigenvalue(triangles) / 2
+        self._largest = largest_eigenvalue(triangles)
+        half = self._largest / 2
         # S = (I - W) / half - I; W is a mean: the entries of a row are all alike.
         self._own, self._share = 1 / half - 1, 1 / (half * count)
         rows = np.repeat(np.arange(n_vertices), count)
         self._bandwidth = max(1, int(np.abs(rows - renumbered.indices).max(initial=0)))
-        self.coefficients = filter_coefficients(parameters.steps, parameters.lambda_, parameters.mu, 2 * half)
+        self.coefficients = filter_coefficients(parameters.steps, parameters.lambda_, parameters.mu, self._largest)
         # Terms below what so many passes in single precision round away are passes for nothing.
         tail = np.cumsum(np.abs(self.coefficients[::-1]))[::-1]
         self._coefficients32 = self.coefficients[: max(1, int(np.count_nonzero(tail > 3e-7)))]
@@ -129,6 +130,16 @@ class SmoothingFilter:
         result[self.order] = self.smooth_block(np.ascontiguousarray(values[self.order]))
         return result
 
+    def average(self, values: NDArray[np.float64], passes: int) -> NDArray[np.float64]:
+        """``((I + W) / 2)^passes values`` for an array ``(V, C)`` in the original numbering; ``W`` is a mean.
+
+        A polynomial, too, of a degree that grows with the root of the passes only.
+        """
+        block = np.ascontiguousarray(values[self.order])
+        result = np.empty_like(block)
+        result[self.order] = self._polynomial(filter_coefficients(passes, 0.5, 0.0, self._largest), block)
+        return result
+
     def smooth_block(
         self, block: NDArray[np.floating], out: NDArray[np.floating] | None = None
     ) -> NDArray[np.floating]:
@@ -137,6 +148,12 @@ class SmoothingFilter:
         The block is left alone. Rounding is that of its type: give small deltas, not positions, where float32 is used.
         """
         coefficients = self._coefficients32 if block.dtype == np.float32 else self.coefficients
+        return self._polynomial(coefficients, block, out)
+
+    def _polynomial(
+        self, coefficients: NDArray[np.float64], block: NDArray[np.floating], out: NDArray[np.floating] | None = None
+    ) -> NDArray[np.floating]:
+        """The polynomial with these Chebyshev coefficients, of ``W``, applied to a block."""
         smooth = np.empty_like(block) if out is None else out
         flat = block.reshape(len(block), -1)
         chebyshev_of_average(

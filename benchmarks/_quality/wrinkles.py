@@ -99,8 +99,7 @@ class _Details:
         deltas, details = np.empty_like(frames), np.empty_like(frames)
         for block, out in zip(self.source.decompose(frames, still, 0), (deltas, details), strict=True):
             block_to_frames(block, self.source.filter.position, out)
-        rest, triangles = self.source.rest.smooth, self.source.mesh.triangles
-        gain = detail_gain(parameters, rest, self.target.rest.smooth, triangles)
+        gain = detail_gain(parameters, self.source.rest.smooth, self.target)
         coating = None
         if parameters.method == "coating":
             coating = CoatingDetails(self.source, self.target, deltas, details, gain, parameters.screening)

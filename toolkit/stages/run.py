@@ -56,7 +56,7 @@ STAGES: dict[str, Stage] = {
             reads=("source_vertices.npy", "source_triangles.npy"),
         ),
         Stage("bases", ("inputs", "decompose"), ("bases",), bases.work, version=3, reads=("lines.json",)),
-        Stage("transfer", ("register", "bases"), ("smoothing", "transfer", "details"), transfer.work, version=2),
+        Stage("transfer", ("register", "bases"), ("smoothing", "transfer", "details"), transfer.work, version=3),
         Stage("result", ("transfer",), ("smoothing", "details"), result.work, version=4, by_frames=True),
     )
 }

@@ -39,8 +39,8 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     progress("factorising", 0, 1)
     system = _system(shot, target, shapes, motion)
     progress("factorising", 1, 1)
-    source, pairs, smooth = load_mesh(shot, "source"), load_pairs(shot), system.source
-    gain = detail_gain(shot.config.details, smooth, target.rest.smooth, source.triangles)
+    source, pairs = load_mesh(shot, "source"), load_pairs(shot)
+    gain = detail_gain(shot.config.details, system.source, target)
     gaps = np.array(shot.array("bases", "pair_gaps"))[1:][frames]
     contact_map = ContactMap(pairs, source.vertices, target.mesh.vertices)
     bases = transfer_bases(system, target, shapes, details[frames], gain, pairs, contact_map, gaps, progress)
