@@ -24,6 +24,7 @@ from toolkit.solve import Factor, factorise
 __all__ = [
     "DeformationTransfer",
     "TransferParameters",
+    "largest_motion",
     "line_gradients",
     "triangle_weights",
 ]
@@ -180,6 +181,17 @@ def triangle_weights(rest: Array, shapes: NDArray[np.floating], triangles: NDArr
     largest = np.empty(len(triangles))
     largest_changes(rest, _inverse_edge_frames(rest, triangles), _changes(shapes, rest), triangles, largest)
     return 1 / (1 + largest)
+
+
+def largest_motion(rest: Array, shapes: NDArray[np.floating]) -> Array:
+    """How far each vertex moves at most from rest in the shapes ``(K, V, 3)``, ``(V,)``.
+
+    The bases tell it: all frames are sums of them, and what no basis moves no frame of the target moves.
+    """
+    squared = np.zeros(len(rest))
+    for shape in shapes:
+        np.maximum(squared, np.sum((shape - rest) ** 2, axis=1), out=squared)
+    return np.sqrt(squared)
 
 
 def _changes(shapes: NDArray[np.floating], rest: Array) -> Array:

@@ -8,8 +8,8 @@ from toolkit.mesh import TriangleMesh
 from toolkit.meshio import write_mesh
 from toolkit.shot import Shot
 from toolkit.stages import run_stages
-from toolkit.stages.transfer import _motion, open_system
-from toolkit.transfer import DeformationTransfer, triangle_weights
+from toolkit.stages.transfer import open_system
+from toolkit.transfer import DeformationTransfer, largest_motion, triangle_weights
 
 
 def test_edits_get_the_matrix_that_the_bases_were_solved_with(
@@ -29,7 +29,7 @@ def test_edits_get_the_matrix_that_the_bases_were_solved_with(
     shapes = smooth + deltas[np.array(shot.array("bases", "frames"))]
     rest, bases = np.array(shot.array("transfer", "rest")), np.array(shot.array("transfer", "bases"))
     weights = triangle_weights(smooth, shapes, bump.triangles)
-    made = DeformationTransfer(smooth, rest, bump.triangles, _motion(deltas), weights=weights)
+    made = DeformationTransfer(smooth, rest, bump.triangles, largest_motion(smooth, shapes), weights=weights)
     system = open_system(shot)
     assert abs(system.matrix - made.matrix).max() < 1e-12 * abs(made.matrix).max()
     right = system.matrix @ (bases[1] - rest)

@@ -22,7 +22,7 @@ from toolkit.solve import Factor, factorise
 from toolkit.stages.bases import load_pairs
 from toolkit.stages.inputs import load_lines, load_mesh
 from toolkit.stages.register import load_target
-from toolkit.transfer import DeformationTransfer, triangle_weights
+from toolkit.transfer import DeformationTransfer, largest_motion, triangle_weights
 
 __all__ = ["SavedSystem", "open_system", "target_decomposer", "work"]
 
@@ -35,9 +35,8 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     frames = np.array(shot.array("bases", "frames"))
     details = shot.array("decompose", "details")
     shapes = _shapes(shot)
-    motion = _motion(shot.array("decompose", "smooth_deltas"))
     progress("factorising", 0, 1)
-    system = _system(shot, target, shapes, motion)
+    system = _system(shot, target, shapes)
     progress("factorising", 1, 1)
     source, pairs = load_mesh(shot, "source"), load_pairs(shot)
     gain = detail_gain(shot.config.details, system.source, target)
@@ -93,26 +92,16 @@ def _shapes(shot: Shot) -> np.ndarray:
     return np.asarray(smooth + shot.array("decompose", "smooth_deltas")[frames])
 
 
-def _system(shot: Shot, target: Decomposer, shapes: np.ndarray, motion: np.ndarray) -> DeformationTransfer:
+def _system(shot: Shot, target: Decomposer, shapes: np.ndarray) -> DeformationTransfer:
     smooth, triangles = np.array(shot.array("decompose", "rest_smooth")), target.mesh.triangles
     weights = triangle_weights(smooth, shapes, triangles) if shot.config.transfer.robust else None
     return DeformationTransfer(
         smooth,
         target.rest.smooth,
         triangles,
-        motion,
+        largest_motion(smooth, shapes),
         line_edges(load_lines(shot)),
         load_pairs(shot),
         shot.config.transfer,
         weights,
     )
-
-
-def _motion(deltas: np.ndarray) -> np.ndarray:
-    """How far each vertex moves at most over the take, ``(V,)``."""
-    farthest = np.zeros(deltas.shape[1], dtype=deltas.dtype)
-    squares = np.empty_like(deltas[0])
-    for frame in deltas:
-        np.multiply(frame, frame, out=squares)
-        np.maximum(farthest, squares[:, 0] + squares[:, 1] + squares[:, 2], out=farthest)
-    return np.sqrt(farthest.astype(np.float64))
