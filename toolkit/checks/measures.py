@@ -19,10 +19,9 @@ def squared_lengths(points: Array, edges: Ids) -> Array:
     """Squared lengths (E,) of edges (E, 2) between points (V, 3)."""
     squared = np.empty(len(edges))
     for e in range(len(edges)):
-        i, j = edges[e]
-        squared[e] = 0.0
-        for k in range(3):
-            squared[e] += (points[i, k] - points[j, k]) ** 2
+        i, j = edges[e, 0], edges[e, 1]
+        x, y, z = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
+        squared[e] = x * x + y * y + z * z
     return squared
 
 

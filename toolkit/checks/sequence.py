@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from toolkit.checks.edges import edge_table
 from toolkit.checks.findings import Finding, and_more
 from toolkit.checks.measures import squared_lengths
 from toolkit.checks.scale import unit_guess
 from toolkit.errors import InputError
 from toolkit.mesh import TriangleMesh
-from toolkit.mesh.topology import unique_edges
 from toolkit.meshio.sequence import FrameSequence
 from toolkit.progress import Progress, silent
 
-__all__ = ["check_pair", "check_sequence", "torn_edges"]
+__all__ = ["check_pair", "check_sequence"]
 
 SIZE_RANGE = (0.5, 2.0)
 """A face neither halves nor doubles in a take: outside of this, the unit or the data is wrong."""
@@ -34,14 +34,15 @@ def check_pair(reference: TriangleMesh, sequence: FrameSequence, where: object =
     if sequence.n_vertices != reference.n_vertices:
         what = f"the reference has {reference.n_vertices} vertices, the frames have {sequence.n_vertices}"
         return [Finding("error", _named(what, where), sequence.where, None, _TOPOLOGY)]
-    edges = unique_edges(reference.triangles)
+    edges = edge_table(reference.triangles, reference.n_vertices).edges
     if len(edges) == 0:
         return []
+    rest = _relative_lengths(reference.vertices, edges)
     for frame in _spread(sequence.n_frames, 5):
         positions = sequence.read(frame, frame + 1)[0].astype(np.float64)
         if not np.isfinite(positions).all() or _size(positions) == 0:
             continue  # check_sequence says this better
-        torn = torn_edges(reference.vertices, positions, edges)
+        torn = _torn(rest, _relative_lengths(positions, edges))
         if torn.mean() > TORN_SHARE:
             i, j = edges[np.argmax(torn)]
             what = (
@@ -52,14 +53,17 @@ def check_pair(reference: TriangleMesh, sequence: FrameSequence, where: object =
     return []
 
 
-def torn_edges(reference: NDArray[np.float64], positions: NDArray[np.float64], edges: NDArray) -> NDArray[np.bool_]:
+def _relative_lengths(positions: NDArray[np.float64], edges: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Squared lengths ``(E,)`` of the edges in units of the face's size."""
+    return np.asarray(squared_lengths(positions, edges) / _size(positions) ** 2)
+
+
+def _torn(rest: NDArray[np.float64], moved: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Mask ``(E,)`` of the edges that are ten times as long as in the reference, and long beside the face.
 
-    Positions ``(V, 3)``; a difference in scale is taken out. The second condition spares the small edges at the
-    corner of a mouth that opens.
+    From squared lengths beside the face's size. The second condition spares the small edges at the corner of a mouth
+    that opens.
     """
-    before, after = _size(reference), _size(positions)
-    rest, moved = squared_lengths(reference, edges) / before**2, squared_lengths(positions, edges) / after**2
     return np.asarray(moved > np.maximum(100 * rest, 0.01))
 
 
@@ -73,19 +77,17 @@ def check_sequence(
     place = str(where or sequence.where)
     faulty = _NonFinite(place)
     sizes = np.full(sequence.n_frames, np.nan)
-    # Every n-th vertex: the size needs no more, and the check stays as quick as the reading.
-    sample = slice(None, None, max(1, sequence.n_vertices // _SAMPLED))
     try:
         for start, stop in sequence.blocks():
-            block = sequence.read(start, stop)
+            block = sequence.view(start, stop)
             faulty.look(block, start)
-            sizes[start:stop] = _sizes(block[:, sample])
+            sizes[start:stop] = _sizes(block)
             progress("checking frames", stop, sequence.n_frames)
     except InputError as error:  # a frame that cannot be read: another vertex count, a torn file
         return [*faulty.findings(), Finding("error", error.what, error.where, None, error.remedy)]
     findings = faulty.findings()
     if sequence.n_vertices == reference.n_vertices:
-        findings += _wrong_sizes(sizes, float(_sizes(reference.vertices[None, sample])[0]), place)
+        findings += _wrong_sizes(sizes, _size(reference.vertices), place)
     return findings
 
 
@@ -139,8 +141,11 @@ def _wrong_sizes(sizes: NDArray[np.float64], reference: float, where: str) -> li
 
 
 def _sizes(block: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Root mean square distance from the middle, ``(t,)``; unlike a bounding box it stays as a head turns."""
-    x = block.astype(np.float64)
+    """Root mean square distance from the middle, ``(t,)``; unlike a bounding box it stays as a head turns.
+
+    Of every n-th vertex: a size needs no more, and checking stays as quick as reading.
+    """
+    x = block[:, :: max(1, block.shape[1] // _SAMPLED)].astype(np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
         x -= x.mean(axis=1, keepdims=True)
         return np.sqrt((x * x).sum(axis=2).mean(axis=1))

@@ -57,14 +57,19 @@ class FrameSequence:
 
         With ``vertices`` (n,) only these, ``(stop - start, n, 3)``; in ``out`` if that is given.
         """
+        block = self._block(start, stop)
+        return np.array(block if vertices is None else block[:, vertices], dtype=np.float32, order="C")
+
+    def view(self, start: int, stop: int) -> NDArray[np.float32]:
+        """Return frames as `read` does, but nobody may write to them: they may be the file itself, mapped."""
+        return np.asarray(self._block(start, stop), dtype=np.float32, order="C")
+
+    def _block(self, start: int, stop: int) -> NDArray:
         if not 0 <= start <= stop <= self.n_frames:
             raise IndexError(f"frames {start}:{stop} are outside 0:{self.n_frames} of {self.where}")
-        if out is None:
-            out = np.empty((stop - start, self.n_vertices if vertices is None else len(vertices), 3), dtype=np.float32)
-        if start < stop:
-            block = self.read_block(start, stop)
-            out[:] = block if vertices is None else block[:, vertices]
-        return out
+        if start == stop:
+            return np.zeros((0, self.n_vertices, 3), dtype=np.float32)
+        return self.read_block(start, stop)
 
     def blocks(self) -> Iterator[tuple[int, int]]:
         """Yield ``(start, stop)`` over all frames, in blocks of about 64 MB."""
