@@ -16,10 +16,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from toolkit.blocks import scratch
-from toolkit.kernels import block_to_frames, frames_to_block, opposite_edges, take_details
+from toolkit.kernels import block_to_frames, frames_to_block, longest_in_plane, opposite_edges, take_details
 from toolkit.mesh.core import TriangleMesh
-from toolkit.mesh.geometry import local_frames, vertex_normals
-from toolkit.mesh.topology import connected_components, unique_edges, vertex_adjacency
+from toolkit.mesh.geometry import local_frames
+from toolkit.mesh.topology import connected_components, vertex_adjacency
 from toolkit.meshio.sequence import FrameSequence
 from toolkit.operators import uniform_laplacian
 from toolkit.smoothing import SmoothingFilter, SmoothingParameters, smoothing_filter
@@ -135,19 +135,8 @@ def frame_neighbours(vertices: Array, triangles: NDArray[np.integer]) -> NDArray
     The one whose edge is longest in the tangent plane: the direction then depends least on noise. A vertex without
     neighbours points to itself.
     """
-    normals = vertex_normals(vertices, triangles)
-    edges = unique_edges(triangles)
-    vector = vertices[edges[:, 1]] - vertices[edges[:, 0]]
-    squared = np.sum(vector**2, axis=1)
-    start, end = np.concatenate([edges, edges[:, ::-1]]).T
-    along = np.concatenate([np.einsum("ei,ei->e", vector, normals[edges[:, k]]) for k in (0, 1)])
-    in_plane = np.tile(squared, 2) - along**2
-    longest = np.full(len(vertices), -np.inf)
-    np.maximum.at(longest, start, in_plane)
-    winners = np.flatnonzero(in_plane == longest[start])[::-1]
-    neighbour = np.arange(len(vertices))
-    neighbour[start[winners]] = end[winners]  # of equal ones the first stays, being written last
-    return neighbour
+    starts, edges = opposite_edges(np.asarray(triangles), len(vertices))
+    return longest_in_plane(np.asarray(vertices, dtype=np.float64), starts, edges)
 
 
 def coating(vertices: Array, smooth: Array, triangles: NDArray[np.integer]) -> Array:

@@ -16,6 +16,7 @@ __all__ = [
     "block_to_frames",
     "chebyshev_of_average",
     "frames_to_block",
+    "longest_in_plane",
     "opposite_edges",
     "place_frames",
     "renumber_frames",
@@ -201,6 +202,31 @@ def opposite_edges(triangles, n_vertices):
             edges[at, 0], edges[at, 1] = triangles[f, (k + 1) % 3], triangles[f, (k + 2) % 3]
             starts[triangles[f, k] + 1] = at + 1
     return starts[:-1], edges
+
+
+@njit(**_OPTIONS)
+def longest_in_plane(vertices, starts, edges):
+    """The neighbour of each vertex whose edge is longest in the tangent plane, ``(V,)``; the first of equal ones.
+
+    ``vertices`` (V, 3) float64; ``starts`` and ``edges`` are the mesh's `opposite_edges`. A lone vertex has itself.
+    """
+    points, normal = vertices.reshape(-1, 3, 1), np.empty((3, 1))
+    longest = np.arange(len(vertices))
+    for v in range(len(vertices)):
+        _sum_normals(points, starts, edges, v, normal)
+        nx, ny, nz = _unit(normal[0, 0], normal[1, 0], normal[2, 0])
+        best = -np.inf
+        for e in range(starts[v], starts[v + 1]):
+            for w in edges[e]:
+                x, y, z = (
+                    vertices[w, 0] - vertices[v, 0],
+                    vertices[w, 1] - vertices[v, 1],
+                    vertices[w, 2] - vertices[v, 2],
+                )
+                in_plane = x * x + y * y + z * z - (x * nx + y * ny + z * nz) ** 2
+                if in_plane > best:
+                    best, longest[v] = in_plane, w
+    return longest
 
 
 @njit(**_ARITHMETIC)

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from toolkit.mesh.topology import boundary_edges, vertex_adjacency
+from toolkit.mesh.topology import edge_counts, unique_edges, vertex_adjacency
 
 __all__ = ["neighbour_average", "smoothing_average", "uniform_laplacian"]
 
@@ -30,17 +30,17 @@ def smoothing_average(triangles: NDArray[np.integer], n_vertices: int) -> sp.csr
     As `neighbour_average`, but a border vertex averages itself and its neighbours along the border, so that the
     border is smoothed as a curve and does not creep inwards.
     """
-    border = boundary_edges(triangles)
+    edges, on_edge = unique_edges(triangles), edge_counts(triangles) == 1
     on_border = np.zeros(n_vertices, dtype=bool)
-    on_border[border.ravel()] = True
-    inner = sp.diags((~on_border).astype(float)) @ vertex_adjacency(triangles, n_vertices)
-    rows = np.concatenate([border[:, 0], border[:, 1], np.flatnonzero(on_border)])
-    cols = np.concatenate([border[:, 1], border[:, 0], np.flatnonzero(on_border)])
-    along = sp.csr_matrix((np.ones(len(rows)), (rows, cols)), shape=(n_vertices, n_vertices))
-    return _row_mean(sp.csr_matrix(inner + along))
+    on_border[edges[on_edge].ravel()] = True
+    start, end = np.concatenate([edges, edges[:, ::-1]]).T
+    seen = np.tile(on_edge, 2) | ~on_border[start]
+    own = np.flatnonzero(on_border)
+    rows, cols = np.concatenate([start[seen], own]), np.concatenate([end[seen], own])
+    return _row_mean(sp.csr_matrix((np.ones(len(rows)), (rows, cols)), shape=(n_vertices, n_vertices)))
 
 
 def _row_mean(adjacency: sp.csr_matrix) -> sp.csr_matrix:
-    degree = np.asarray(adjacency.sum(axis=1)).ravel()
-    lonely = sp.diags((degree == 0).astype(float))
-    return sp.csr_matrix(sp.diags(1 / np.maximum(degree, 1)) @ adjacency + lonely)
+    degree = np.diff(adjacency.indptr)
+    mean = sp.csr_matrix((1 / np.repeat(degree, degree), adjacency.indices, adjacency.indptr), shape=adjacency.shape)
+    return mean if degree.all() else sp.csr_matrix(mean + sp.diags((degree == 0).astype(float)))

@@ -7,6 +7,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components as _components
 
+from toolkit.remembered import remembered
+
 __all__ = [
     "boundary_edges",
     "boundary_vertices",
@@ -62,9 +64,14 @@ def connected_components(triangles: NDArray[np.integer], n_vertices: int) -> tup
     return int(count), labels
 
 
+@remembered
 def _edges_with_counts(triangles: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Kept, since every operator on a mesh asks for them, and so read-only."""
     t = np.asarray(triangles, dtype=np.int64)
     n = max(1, int(t.max(initial=-1)) + 1)
     sides = [np.minimum(a, b) * n + np.maximum(a, b) for a, b in ((t[:, i], t[:, (i + 1) % 3]) for i in range(3))]
     keys, counts = np.unique(np.concatenate(sides), return_counts=True)
-    return np.stack([keys // n, keys % n], axis=1), counts
+    edges = np.stack([keys // n, keys % n], axis=1)
+    edges.setflags(write=False)
+    counts.setflags(write=False)
+    return edges, counts

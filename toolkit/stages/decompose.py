@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
@@ -21,10 +22,11 @@ __all__ = ["load_motion", "source_decomposer", "work"]
 
 def work(shot: Shot, folder: StageFolder, progress: Progress, map_blocks: MapBlocks = map_blocks) -> None:
     """Stabilise and split every frame."""
-    sequence = load_sequence(shot)
-    decomposer = source_decomposer(shot, again=False)
-    enabled = shot.config.stabilise.enabled
-    motion = fit_head_motion(sequence, decomposer.mesh.vertices, enabled=enabled, progress=progress)
+    sequence, mesh = load_sequence(shot), load_mesh(shot, "source")
+    with ThreadPoolExecutor(1) as pool:  # neither needs the other, and both leave a processor idle
+        prepared = pool.submit(Decomposer, mesh, shot.config.smoothing)
+        motion = fit_head_motion(sequence, mesh.vertices, enabled=shot.config.stabilise.enabled, progress=progress)
+    decomposer = prepared.result()
     folder.save("rest_smooth", decomposer.rest.smooth)
     folder.save("neighbour", decomposer.rest.neighbour)
     folder.save("rotations", motion.rotations)
@@ -45,10 +47,9 @@ def work(shot: Shot, folder: StageFolder, progress: Progress, map_blocks: MapBlo
     }
 
 
-def source_decomposer(shot: Shot, *, again: bool = True) -> Decomposer:
-    """The source's smoothing and local frames, as the stage uses them."""
-    neighbour = np.array(shot.array("decompose", "neighbour")) if again else None
-    return Decomposer(load_mesh(shot, "source"), shot.config.smoothing, neighbour)
+def source_decomposer(shot: Shot) -> Decomposer:
+    """The source's smoothing and local frames, as the stage used them."""
+    return _decomposer(shot, shot.array("decompose", "neighbour"))
 
 
 def load_motion(shot: Shot) -> HeadMotion:
@@ -60,10 +61,12 @@ def load_motion(shot: Shot) -> HeadMotion:
 def _open_blocks(shot_path: Path, written: Path) -> Fill:
     """The stage's work on blocks for another process, from what the stage has ``written`` so far."""
     shot, folder = Shot(shot_path), StageFolder(written)
-    neighbour = np.array(folder.array("neighbour"))
-    decomposer = Decomposer(load_mesh(shot, "source"), shot.config.smoothing, neighbour)
     motion = HeadMotion(np.array(folder.array("rotations")), np.array(folder.array("translations")))
-    return partial(_decompose, load_sequence(shot), decomposer, motion)
+    return partial(_decompose, load_sequence(shot), _decomposer(shot, folder.array("neighbour")), motion)
+
+
+def _decomposer(shot: Shot, neighbour: np.ndarray) -> Decomposer:
+    return Decomposer(load_mesh(shot, "source"), shot.config.smoothing, np.array(neighbour))
 
 
 def _decompose(
