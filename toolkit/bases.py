@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.blas import dsyrk, ssyrk
 
-from toolkit.blocks import map_blocks
+from toolkit.blocks import map_blocks, scratch
 from toolkit.compiled import njit
 from toolkit.errors import InputError
 from toolkit.progress import Progress, silent
@@ -80,15 +79,15 @@ def gram_matrix(deltas: NDArray[np.floating], progress: Progress = silent) -> Ar
     products = {}
 
     def work(start: int, stop: int) -> None:
-        columns = np.ascontiguousarray(flat[:, start:stop])
-        # Half of the product, its other half being the same; in single precision inside a chunk, double over chunks.
-        products[start] = (ssyrk if columns.dtype == np.float32 else dsyrk)(1.0, columns.T, trans=1, lower=1)
+        columns = scratch("columns", (len(flat), stop - start), flat.dtype)
+        columns[:] = flat[:, start:stop]
+        products[start] = columns @ columns.T  # single precision inside a chunk, double over chunks
 
     map_blocks(work, flat.shape[1], _CHUNK_COLUMNS, what="comparing frames", progress=progress)
     total = np.zeros((len(flat), len(flat)))
     for start in sorted(products):  # always in this order, whichever was done first
         total += products[start]
-    return np.tril(total) + np.tril(total, -1).T
+    return total
 
 
 def select_bases(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 
 from toolkit.bases import gram_matrix, select_bases
@@ -24,9 +26,10 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     """Find the contacts, choose bases, fit weights."""
     source = load_mesh(shot, "source")
     openings = find_openings(load_lines(shot), source.vertices)
-    pairs, gaps = _contacts(openings, source.vertices, load_sequence(shot), load_motion(shot), progress)
-    deltas = shot.array("decompose", "smooth_deltas")
-    gram = gram_matrix(deltas, progress)
+    with ThreadPoolExecutor(1) as pool:  # beside the Gram matrix, whose threads wait for the memory now and then
+        found = pool.submit(_contacts, openings, source.vertices, load_sequence(shot), load_motion(shot))
+        gram = gram_matrix(shot.array("decompose", "smooth_deltas"), progress)
+    pairs, gaps = found.result()
     chosen = select_bases(gram, source.n_vertices, shot.config.bases, gaps[1:] - gaps[0], progress)
     for name, array in {
         "frames": chosen.frames,
@@ -59,7 +62,7 @@ def load_pairs(shot: Shot) -> ContactPairs:
 
 
 def _contacts(
-    openings: list[Opening], rest: np.ndarray, sequence: FrameSequence, motion: HeadMotion, progress: Progress
+    openings: list[Opening], rest: np.ndarray, sequence: FrameSequence, motion: HeadMotion
 ) -> tuple[ContactPairs, np.ndarray]:
     """Pairs, and their gaps ``(1 + T, P, 3)`` at rest and in every stabilised frame.
 
@@ -69,7 +72,6 @@ def _contacts(
     points = np.empty((sequence.n_frames, len(ids), 3))
     for start, stop in sequence.blocks():
         points[start:stop] = sequence.read(start, stop, ids)
-        progress("reading the rims of lids and lips", stop, sequence.n_frames)
     points = np.einsum("tji,tnj->tni", motion.rotations, points - motion.translations[:, None])
     compact = [Opening(o.name, np.searchsorted(ids, o.upper), np.searchsorted(ids, o.lower)) for o in openings]
     step = -(-sequence.n_frames // _PAIRING_FRAMES)

@@ -51,11 +51,11 @@ STAGES: dict[str, Stage] = {
             ("inputs",),
             ("stabilise", "smoothing"),
             decompose.work,
-            version=6,
+            version=7,
             by_frames=True,
             reads=("source_vertices.npy", "source_triangles.npy"),
         ),
-        Stage("bases", ("inputs", "decompose"), ("bases",), bases.work, version=3, reads=("lines.json",)),
+        Stage("bases", ("inputs", "decompose"), ("bases",), bases.work, version=4, reads=("lines.json",)),
         Stage("transfer", ("register", "bases"), ("smoothing", "transfer", "details"), transfer.work, version=3),
         Stage("result", ("transfer",), ("smoothing", "details"), result.work, version=4, by_frames=True),
     )
