@@ -16,9 +16,10 @@ from toolkit.checks import (
     log_findings,
     raise_for,
 )
+from toolkit.checks.edges import edge_table
 from toolkit.checks.inputs import Places
 from toolkit.feature_lines import FeatureLine, load_feature_lines, save_feature_lines, trace_lines
-from toolkit.mesh import Polygons, TriangleMesh, connected_components
+from toolkit.mesh import Polygons, TriangleMesh
 from toolkit.meshio import FrameSequence, cache_as_npy, open_sequence, read_mesh
 from toolkit.progress import Progress
 from toolkit.registration.landmarks import Landmarks, load_landmarks
@@ -94,7 +95,7 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
         "target_triangles": target.n_triangles,
         "landmarks": len(landmarks.names),
         "feature_lines": len(lines),
-        "parts": connected_components(source.triangles, source.n_vertices)[0],
+        "parts": int(edge_table(source.triangles, source.n_vertices).parts.max()) + 1,
         "same_topology": same,
     }
 
