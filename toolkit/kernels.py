@@ -128,7 +128,16 @@ def place_frames(points, shift, position, turns, starts, out):
 
 
 @njit(**_ARITHMETIC)
-def _average_rows(starts, neighbours, share, own, first, last, current, coefficient, block, previous):
+def _first_rows(coefficient, first, last, block, current, previous):
+    """Rows ``first <= i < last`` of the recurrence's beginning: ``current <- coefficient block``, ``previous <- 0``."""
+    for i in range(first, last):
+        for c in range(block.shape[1]):
+            current[i, c] = coefficient * block[i, c]
+            previous[i, c] = 0
+
+
+@njit(**_ARITHMETIC)
+def _average_rows(starts, neighbours, share, own, coefficient, first, last, block, current, previous):
     """Rows ``first <= i < last`` of ``previous <- coefficient block + own current - share A current - previous``.
 
     Four neighbours at a time: what is written is then read again a quarter as often.
@@ -136,8 +145,15 @@ def _average_rows(starts, neighbours, share, own, first, last, current, coeffici
     n_columns = block.shape[1]
     for i in range(first, last):
         p, stop, s = starts[i], starts[i + 1], share[i]
-        for c in range(n_columns):
-            previous[i, c] = coefficient * block[i, c] + own * current[i, c] - previous[i, c]
+        if p + 4 <= stop:
+            j, k, m, n = neighbours[p], neighbours[p + 1], neighbours[p + 2], neighbours[p + 3]
+            for c in range(n_columns):
+                seen = (current[j, c] + current[k, c]) + (current[m, c] + current[n, c])
+                previous[i, c] = coefficient * block[i, c] + own * current[i, c] - previous[i, c] - s * seen
+            p += 4
+        else:
+            for c in range(n_columns):
+                previous[i, c] = coefficient * block[i, c] + own * current[i, c] - previous[i, c]
         while p + 4 <= stop:
             j, k, m, n = neighbours[p], neighbours[p + 1], neighbours[p + 2], neighbours[p + 3]
             for c in range(n_columns):
@@ -161,26 +177,23 @@ def chebyshev_of_average(starts, neighbours, share, own, coefficients, bandwidth
     """
     n_rows = len(block)
     degree = len(coefficients) - 1
-    # Chosen so that the last step writes to ``out``.
-    current, previous = (out, spare) if degree % 2 == 0 else (spare, out)
-    for i in range(n_rows):
-        for c in range(block.shape[1]):
-            current[i, c] = coefficients[degree] * block[i, c]
-            previous[i, c] = 0
     double = share + share
     n_chunks = (n_rows + bandwidth - 1) // bandwidth
     done = 0
-    while done < degree:
-        steps = min(depth, degree - done)
+    while done <= degree:
+        steps = min(depth, degree + 1 - done)
         for front in range(n_chunks + steps - 1):
             for step in range(max(0, front - n_chunks + 1), min(steps, front + 1)):
                 first = (front - step) * bandwidth
                 last = min(n_rows, first + bandwidth)
-                k = degree - 1 - done - step
-                # Not swapped but chosen, since the steps of a front alternate.
-                read, write = (current, previous) if (done + step) % 2 == 0 else (previous, current)
+                k = degree - done - step
+                # Not swapped but chosen, since the steps of a front alternate; the last one writes to ``out``.
+                read, write = (spare, out) if k % 2 == 0 else (out, spare)
                 weight, at = (share, own) if k == 0 else (double, own + own)
-                _average_rows(starts, neighbours, weight, at, first, last, read, coefficients[k], block, write)
+                if k == degree:
+                    _first_rows(coefficients[k], first, last, block, write, read)
+                else:
+                    _average_rows(starts, neighbours, weight, at, coefficients[k], first, last, block, read, write)
         done += steps
 
 

@@ -35,8 +35,8 @@ __all__ = [
 
 # Where the pass band ends, as a share of the eigenvalue that 40 steps of (0.5, -0.53) halve.
 _PASS_BAND_SHARE = (1 / 0.5 - 1 / 0.53) / 0.317
-# Passes that go over a block together; from 4 to 12 it makes no difference.
-_STEPS_TOGETHER = 6
+# Passes that go over a block together: of few, a block is read more often; what many need at once leaves the cache.
+_STEPS_TOGETHER = 7
 
 
 @dataclass(frozen=True)
