@@ -2,10 +2,10 @@
 """The paper's Table 1: every row at its size, from decomposition to written frames, with the paper's time beside ours.
 
 Each row is the sample performer with as many vertices, frames and bases as the paper's, onto a stretched copy of it, so
-that no registration is in the way (the paper's times leave it out, too). It runs in a fresh process; everything was
-compiled before. Two floors are measured in the same run: reading the take and writing as many bytes, and the
-back-substitutions of the bases alone. "own" memory is what the process allocated, "all" counts the mapped pages of
-files, which the system takes back when it needs them.
+that no registration is in the way (the paper's times leave it out, too). It runs in a fresh process, which has read and
+checked its inputs (--by-stage says how long that took); everything was compiled before. Two floors are measured in the
+same run: reading the take and writing as many bytes, and the back-substitutions of the bases alone. "own" memory is
+what the process allocated, "all" counts the mapped pages of files, which the system takes back when it needs them.
 
 The paper's machine: Intel i7-2600, 3.4 GHz, 8 threads, 8 GB. With --share the takes are shorter; the seconds are then
 those of the shorter take, and "full" is what they make for all frames in proportion, marked with ~ (too much, since
@@ -118,7 +118,8 @@ def _line(row: dict[str, Any]) -> str:
 
 def _stages(row: dict[str, Any]) -> str:
     parts = [f"{name} {seconds:.1f} s (CPU {row['stages_cpu'][name]:.1f})" for name, seconds in row["stages"].items()]
-    return f"    {', '.join(parts)}; floors {row['read_write_s']:.1f} s and {row['substitutions_s']:.1f} s"
+    floors = f"floors {row['read_write_s']:.1f} s and {row['substitutions_s']:.1f} s"
+    return f"    {', '.join(parts)}; {floors}; before that, reading and checking {row['inputs_s']:.1f} s"
 
 
 def _check_space(folder: Path, rows: list[PaperRow], options: argparse.Namespace) -> None:

@@ -19,7 +19,8 @@ _SOLVES = 3
 
 
 def stages(shot: Shot) -> dict[str, Any]:
-    """Run stages 2 to 5 anew and say what they took."""
+    """Run stages 2 to 5 anew and say what they took; and, aside from that, reading and checking what goes in."""
+    inputs = run_stages(shot, ["inputs"], force=True)[0].seconds
     run_stages(shot, ["register"])
     began = time.perf_counter()
     taken, cpu, bases = {}, {}, 0
@@ -29,7 +30,8 @@ def stages(shot: Shot) -> dict[str, Any]:
         taken[stage], cpu[stage] = report.seconds, _cpu_seconds() - before
         bases = report.numbers.get("bases", bases)
     seconds = time.perf_counter() - began
-    return {"total_s": seconds, "cpu_s": sum(cpu.values()), "stages": taken, "stages_cpu": cpu, "bases": bases}
+    said = {"total_s": seconds, "cpu_s": sum(cpu.values()), "stages": taken, "stages_cpu": cpu, "bases": bases}
+    return said | {"inputs_s": inputs}
 
 
 def _cpu_seconds() -> float:

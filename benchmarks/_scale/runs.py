@@ -38,7 +38,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @dataclass(frozen=True)
 class Run:
-    """Stages 2 to 5, run anew in a fresh process.
+    """Stages 2 to 5, run anew in a fresh process, after the inputs were read and checked there (``inputs_s``).
 
     ``own_gb`` is the most memory of its own that the process had (what it allocated), ``peak_gb`` with the pages of
     mapped files that the system gives back when it needs them (GiB); ``own_gb`` is NaN where the system does not tell.
@@ -51,6 +51,7 @@ class Run:
     bases: int
     own_gb: float
     peak_gb: float
+    inputs_s: float
 
     def data(self) -> dict[str, Any]:
         """For JSON."""
@@ -92,7 +93,8 @@ def write_config(folder: Path, inputs: Path, n_bases: int) -> None:
 def run_measured(shot: Path) -> Run:
     """Run the stages from decomposition to written frames in a fresh process."""
     said, own, peak = _child("stages", shot)
-    return Run(said["total_s"], said["cpu_s"], said["stages"], said["stages_cpu"], said["bases"], own, peak)
+    names = ("total_s", "cpu_s", "stages", "stages_cpu", "bases", "inputs_s")
+    return Run(**{name: said[name] for name in names}, own_gb=own, peak_gb=peak)
 
 
 def substitution_floor(shot: Path) -> float:
