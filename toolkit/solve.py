@@ -75,14 +75,16 @@ def _cholesky(matrix: sp.spmatrix) -> tuple[NDArray[np.uint32], Iterator[NDArray
     from cvxopt import cholmod, spmatrix
     from cvxopt import matrix as dense
 
-    lower = sp.tril(matrix, format="csc")  # CHOLMOD reads no more
-    columns = np.repeat(np.arange(lower.shape[1]), np.diff(lower.indptr))
-    parts = lower.data.astype(np.float64), lower.indices.astype(np.int64), columns
-    half = spmatrix(*(dense(part) if lower.nnz else [] for part in parts), lower.shape)
+    csc = sp.csc_matrix(matrix)
+    n = csc.shape[0]
+    columns = np.repeat(np.arange(n), np.diff(csc.indptr))
+    lower = csc.indices >= columns  # CHOLMOD reads no more
+    parts = csc.data[lower].astype(np.float64), csc.indices[lower].astype(np.int64), columns[lower]
+    half = spmatrix(*(dense(part) if len(part) else [] for part in parts), csc.shape)
     factor = cholmod.symbolic(half)
     cholmod.numeric(half, factor)
     # Asked for the permuted right-hand side, since the permutation itself has no other way out.
-    order = dense(np.arange(lower.shape[0], dtype=np.float64))
+    order = dense(np.arange(n, dtype=np.float64))
     cholmod.solve(factor, order, sys=7)
     found = (np.asarray(memoryview(part)).ravel() for part in cholmod.getfactor(factor).CCS)
     return np.array(order).ravel().astype(np.uint32), found
