@@ -20,7 +20,7 @@ from toolkit.changed_details import ChangedDetails, DetailsChange
 from toolkit.coating_details import CoatingDetails
 from toolkit.decomposition import Decomposer
 from toolkit.errors import InputError
-from toolkit.kernels import place_frames, renumber_frames, rotate_details
+from toolkit.kernels import block_to_frames, place_block, renumber_frames, rotate_details
 from toolkit.mesh.geometry import vertex_areas
 from toolkit.rigid import Similarity
 from toolkit.stabilisation import HeadMotion
@@ -110,10 +110,10 @@ class Reconstruction:
         self._weights = np.asarray(weights, dtype=np.float32)
         smooth = target.rest.smooth
         origin = smooth.mean(axis=0)
-        self._rest = (smooth - origin)[order].astype(np.float32)
-        self._moves = np.empty((smooth.size, len(bases)), dtype=np.float32)
-        for k, basis in enumerate(bases):
-            self._moves[:, k] = (basis - smooth)[order].ravel()
+        # The moves to all bases, and the rest shape, whose weight is one.
+        self._shapes = np.empty((len(bases) + 1, smooth.size), dtype=np.float32)
+        for k, shape in enumerate([*(basis - smooth for basis in bases), smooth - origin]):
+            self._shapes[k] = shape[order].ravel()
         self._own = target.rest.detail[order].astype(np.float32)
         self._gain = np.asarray(gain, dtype=np.float32)[order]
         self._turns, self._starts = _placed(motion, pose, origin)
@@ -145,7 +145,9 @@ class Reconstruction:
         points = self._large_scale(start, stop)
         shift = self._detail_shift(points, details, start, stop)
         turns, starts = (np.ascontiguousarray(x[..., start:stop]) for x in (self._turns, self._starts))
-        place_frames(points, shift, self._target.filter.position, turns, starts, out)
+        placed = scratch("placed", points.shape)
+        place_block(points, shift, turns, starts, placed)
+        block_to_frames(placed, self._target.filter.position, out)
 
     def detail_offsets(self, frame: int, details: NDArray[np.float32]) -> NDArray[np.float32]:
         """What details add to the large-scale shape of a frame, before the head's motion, ``(V, 3)``.
@@ -161,8 +163,8 @@ class Reconstruction:
         """``T~_t`` about the origin, ``(V, 3, B)``."""
         weights = self._weights[start:stop]
         points = scratch("points", (len(self._order), 3, len(weights)))
-        np.matmul(self._moves, weights.T, out=points.reshape(-1, len(weights)))
-        points += self._rest[:, :, None]
+        shares = np.vstack([weights.T, np.ones_like(weights[:, :1]).T])
+        np.matmul(self._shapes.T, shares, out=points.reshape(-1, len(weights)))
         for change in self._bases_changes:
             share = np.einsum("tk,ukc->uct", weights, change.coefficients).astype(np.float32)
             if share.any():

@@ -18,7 +18,7 @@ __all__ = [
     "frames_to_block",
     "longest_in_plane",
     "opposite_edges",
-    "place_frames",
+    "place_block",
     "renumber_frames",
     "rotate_details",
     "take_details",
@@ -92,39 +92,20 @@ def block_to_frames(block, position, out):
 
 
 @njit(**_ARITHMETIC)
-def _placed_tile(points, shift, position, turns, starts, first, last, tile):
-    for v in range(first, last):
-        p = position[v]
-        for k in range(3):
-            for b in range(points.shape[2]):
-                x, y, z = (
-                    points[p, 0, b] + shift[p, 0, b],
-                    points[p, 1, b] + shift[p, 1, b],
-                    points[p, 2, b] + shift[p, 2, b],
-                )
-                tile[v - first, k, b] = turns[k, 0, b] * x + turns[k, 1, b] * y + turns[k, 2, b] * z + starts[k, b]
+def place_block(points, shift, turns, starts, out):
+    """Sum and move: ``out[v, :, b] = turns_b (points + shift)[v, :, b] + starts_b``.
 
-
-@njit(**_OPTIONS)
-def _tile_to_frames(tile, first, last, frames):
-    for b in range(frames.shape[0]):
-        for v in range(first, last):
-            for k in range(3):
-                frames[b, v, k] = tile[v - first, k, b]
-
-
-@njit(**_OPTIONS)
-def place_frames(points, shift, position, turns, starts, out):
-    """Sum, move and renumber: ``out[b, v] = turns_b (points + shift)[position[v], :, b] + starts_b``.
-
-    ``points`` and ``shift`` (V, 3, B), ``turns`` (3, 3, B) and ``starts`` (3, B) float32, ``out`` (B, V, 3).
+    ``points``, ``shift`` and ``out`` (V, 3, B), ``turns`` (3, 3, B) and ``starts`` (3, B) float32.
     """
-    n_vertices, _, n_frames = points.shape
-    tile = np.empty((_TILE, 3, n_frames), points.dtype)
-    for first in range(0, n_vertices, _TILE):
-        last = min(n_vertices, first + _TILE)
-        _placed_tile(points, shift, position, turns, starts, first, last, tile)
-        _tile_to_frames(tile, first, last, out)
+    for v in range(len(points)):
+        for b in range(points.shape[2]):
+            x, y, z = (
+                points[v, 0, b] + shift[v, 0, b],
+                points[v, 1, b] + shift[v, 1, b],
+                points[v, 2, b] + shift[v, 2, b],
+            )
+            for k in range(3):
+                out[v, k, b] = turns[k, 0, b] * x + turns[k, 1, b] * y + turns[k, 2, b] * z + starts[k, b]
 
 
 @njit(**_ARITHMETIC)

@@ -57,7 +57,7 @@ STAGES: dict[str, Stage] = {
         ),
         Stage("bases", ("inputs", "decompose"), ("bases",), bases.work, version=4, reads=("lines.json",)),
         Stage("transfer", ("register", "bases"), ("smoothing", "transfer", "details"), transfer.work, version=3),
-        Stage("result", ("transfer",), ("smoothing", "details"), result.work, version=4, by_frames=True),
+        Stage("result", ("transfer",), ("smoothing", "details"), result.work, version=5, by_frames=True),
     )
 }
 
