@@ -17,11 +17,12 @@ from data.rims import closed_lips
 from data.subdivision import catmull_clark
 from toolkit.mesh import vertex_adjacency
 
-__all__ = ["EYES", "HEADS", "SHAPES", "Head", "build_head", "eyeballs", "face_units"]
+__all__ = ["EYES", "HEADS", "PERFORMER", "SHAPES", "Head", "build_head", "eyeballs", "face_units"]
 
 Array = NDArray[np.float64]
 
-HEADS = ("male_young", "african_old", "asian_female", "child", "orc", "hound")
+PERFORMER = "male_young"
+HEADS = (PERFORMER, "african_old", "asian_female", "child", "orc", "hound")
 _SIDED = "browDown browOuterUp cheekSquint eyeBlink eyeLookDown eyeLookIn eyeLookOut eyeLookUp eyeSquint eyeWide "
 _SIDED += "mouthDimple mouthFrown mouthLowerDown mouthPress mouthSmile mouthStretch mouthUpperUp noseSneer"
 _SINGLE = "browInnerUp cheekPuff jawForward jawLeft jawOpen jawRight mouthClose mouthFunnel mouthLeft mouthPucker "

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from data.files import write_json, write_obj, write_ply
-from data.heads import SHAPES, Head, build_head, eyeballs
+from data.heads import PERFORMER, SHAPES, Head, build_head, eyeballs
 from data.layout import load_layout
 from data.package import Package
 from data.performance import expression_weights, head_motion
@@ -19,13 +19,12 @@ from data.relief import static_relief
 from data.remeshing import split_quads
 from data.targets import feature_lines
 from data.wrinkles import WrinkleFamily, wrinkle_families
+from toolkit.feature_lines import save_feature_lines
 from toolkit.progress import Progress, silent
 
 __all__ = ["PERFORMER", "Performer", "build_performer", "load_performer"]
 
 Array = NDArray[np.float64]
-
-PERFORMER = "male_young"
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ def build_performer(package: Package, level: int, folder: Path, progress: Progre
     sp.save_npz(folder / "subdivision.npz", performer.subdivide)
     eyes, eye_triangles = eyeballs(package, head.eyes)
     write_ply(folder / "eyes.ply", eyes.astype(np.float32), eye_triangles)
-    write_json(folder / "feature_lines.json", {"lines": feature_lines(layout, level)})
+    save_feature_lines(folder / "feature_lines.json", feature_lines(layout, level))
     write_json(folder / "landmarks.json", layout.landmarks)
 
 

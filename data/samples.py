@@ -48,9 +48,9 @@ class PerformerPaths:
 class TargetPaths:
     """One target's files.
 
-    ``reference`` PLY; ``truth`` .npz, read by ``Truth.load``; ``landmarks`` (48 pairs on the face), ``landmarks_30``,
-    ``landmarks_head`` (the 48, ears, skull and neck) and ``feature_lines`` JSON in the shot folder's format, with
-    ``target_vertices`` added to each line; ``eyes`` PLY of the eyeballs, for pictures.
+    ``reference`` PLY; ``truth`` .npz, read by ``Truth.load``; ``landmarks`` (45 pairs on the face), ``landmarks_30``,
+    ``landmarks_head`` (the 45, ears, skull and neck) and ``feature_lines`` JSON in the shot folder's format, with
+    ``target_vertices`` added to each line, and guides for the registration; ``eyes`` PLY of the eyeballs, for pictures.
     """
 
     reference: Path

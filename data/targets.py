@@ -11,10 +11,13 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from data.files import write_json, write_ply
-from data.heads import SHAPES, Head, build_head, eyeballs
+from data.guides import guide_lines, guide_stops
+from data.heads import PERFORMER, SHAPES, Head, build_head, eyeballs
 from data.layout import LEVELS, Layout, hand_made, load_layout
 from data.package import Package
-from data.remeshing import Density, Hole, Remesh, remesh
+from data.remeshing import Density, Hole, Remesh, remesh, split_quads
+from toolkit.feature_lines import FeatureLine, save_feature_lines
+from toolkit.mesh import TriangleMesh
 
 __all__ = ["ARCS", "RIMS", "TARGETS", "Truth", "build_target"]
 
@@ -90,13 +93,15 @@ def build_target(package: Package, name: str, level: int, folder: Path) -> None:
     )
     on_head = layout.subdivision.matrix @ neutral
     for count, names in hand_made("landmark_sets").items():
-        file = folder / ("landmarks.json" if count == "48" else f"landmarks_{count}.json")
+        file = folder / ("landmarks.json" if count == "45" else f"landmarks_{count}.json")
         write_json(file, {"pairs": _landmarks(layout, names, on_head, vertices, made)})
-    write_json(folder / "feature_lines.json", {"lines": feature_lines(layout, level, made.lines)})
+    performer = build_head(package, PERFORMER).neutral
+    lines = feature_lines(layout, level, made.lines) + _guides(layout, level, performer, on_head, vertices, made)
+    save_feature_lines(folder / "feature_lines.json", lines)
 
 
-def feature_lines(layout: Layout, level: int, on_target: dict[str, list[int]] | None = None) -> list[dict[str, Any]]:
-    """Entries of feature_lines.json: full edge paths on the performer and, where known, on the target."""
+def feature_lines(layout: Layout, level: int, on_target: dict[str, list[int]] | None = None) -> list[FeatureLine]:
+    """Lines round lids and lips: full edge paths on the performer and, where known, on the target."""
     lines = []
     for name in ARCS:
         arcs = [f"{name}_upper", f"{name}_lower"]
@@ -108,9 +113,20 @@ def feature_lines(layout: Layout, level: int, on_target: dict[str, list[int]] | 
     return lines
 
 
-def _line(name: str, closed: bool, source: list[int], target: list[int] | None) -> dict[str, Any]:
-    line: dict[str, Any] = {"name": name, "closed": closed, "vertices": source}
-    return line if target is None else {**line, "target_vertices": target}
+def _line(name: str, closed: bool, source: list[int], target: list[int] | None) -> FeatureLine:
+    return FeatureLine(name, closed, np.array(source), None if target is None else np.array(target))
+
+
+def _guides(
+    layout: Layout, level: int, performer: Array, on_head: Array, vertices: NDArray[np.float32], made: Remesh
+) -> list[FeatureLine]:
+    """The guides, drawn over the performer without its relief."""
+    count = layout.subdivision.counts[level]
+    source = TriangleMesh(layout.subdivision.matrix[:count] @ performer, split_quads(layout.quads(level)))
+    target = TriangleMesh(vertices.astype(np.float64), made.triangles)
+    ends = [on_head[layout.landmarks[name]] for name in ("menton", "forehead_high")]
+    height = float(np.linalg.norm(ends[1] - ends[0]))
+    return guide_lines(source, target, on_head[:count], guide_stops(layout, level), height)
 
 
 def _round(upper: list[int], lower: list[int]) -> list[int]:

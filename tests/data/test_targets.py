@@ -5,11 +5,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
+from data.guides import guide_stops
 from data.heads import SHAPES, build_head
-from data.layout import LEVELS
+from data.layout import LEVELS, hand_made
 from data.remeshing import closest_on_surface, split_quads
 from data.targets import build_target
+from toolkit.feature_lines import load_feature_lines
 from toolkit.mesh import connected_components, triangle_areas, unique_edges, vertex_normals
 
 
@@ -100,23 +103,52 @@ def test_landmarks_and_lines_name_the_same_places_on_both_faces(coarse):
         vertices, triangles = read_ply(paths.reference)
         truth = coarse.truth(name).shape(np.zeros(52))
         size = np.ptp(vertices, axis=0).max()
-        for file, count in ((paths.landmarks, 48), (paths.landmarks_30, 30)):
+        for file, count in ((paths.landmarks, 45), (paths.landmarks_30, 30)):
             pairs = json.loads(file.read_text())["pairs"]
             assert len({pair["target"] for pair in pairs}) == count
             source, target = (np.array([pair[side] for pair in pairs]) for side in ("source", "target"))
             assert np.linalg.norm(vertices[target] - truth[source], axis=1).max() < 0.03 * size
         # Ears and skull are coarse at this level: their nearest vertex is what can be picked, wherever it is.
         head = json.loads(paths.landmarks_head.read_text())["pairs"]
-        assert len({pair["target"] for pair in head}) == 58
-        assert head[:48] == json.loads(paths.landmarks.read_text())["pairs"]
+        assert len({pair["target"] for pair in head}) == 55
+        assert head[:45] == json.loads(paths.landmarks.read_text())["pairs"]
         edges = {tuple(edge) for edge in unique_edges(triangles).tolist()}
-        lines = json.loads(paths.feature_lines.read_text())["lines"]
+        lines = [line for line in json.loads(paths.feature_lines.read_text())["lines"] if not line.get("guide")]
         assert len(lines) == 12
         for line in lines:
             path = line["target_vertices"] + ([line["target_vertices"][0]] if line["closed"] else [])
             assert all((min(pair), max(pair)) in edges for pair in pairwise(path)), line["name"]
             ends = vertices[path[0]] - truth[line["vertices"][0]]
             assert np.linalg.norm(ends) < 2e-3 * size
+
+
+def test_guides_are_picked_where_they_truly_lie_and_the_midline_once(coarse, layout):
+    stops = guide_stops(layout, 0)
+    given = {guide for kind in hand_made("guides").values() for guide in kind}
+    assert len(stops) == 2 * len(given) - 2
+    assert {"midline_upper", "midline_lower", "jaw_l", "jaw_r", "lid_crease_l", "lid_fold_r"} <= set(stops)
+    for name, paths in coarse.targets.items():
+        (vertices, _), truth = read_ply(paths.reference), coarse.truth(name).shape(np.zeros(52))
+        guides = [line for line in load_feature_lines(paths.feature_lines) if line.guide]
+        assert {guide.name for guide in guides} == set(stops)
+        near = cKDTree(vertices)
+        for guide in guides:
+            assert guide.vertices[[0, -1]].tolist() == [stops[guide.name][0], stops[guide.name][-1]]
+            picked = guide.target_vertices.tolist()
+            assert len(set(picked)) == len(picked)
+            # Each pick is the vertex nearest to some point of the true line, and the picks run along it.
+            along = near.query(truth[guide.vertices])[1].tolist()
+            places = [along.index(vertex) for vertex in picked]
+            assert places == sorted(places)
+
+
+def test_folds_of_the_lids_run_beside_the_rims(layout):
+    stops = guide_stops(layout, 0)
+    for side, word in (("l", "left"), ("r", "right")):
+        rim = set(layout.loops[f"eyelid_rim_{word}"])
+        for guide in ("lid_crease", "lid_fold"):
+            assert not rim & set(stops[f"{guide}_{side}"])
+    assert len(guide_stops(layout, 1)["lid_crease_l"]) == 2 * len(stops["lid_crease_l"]) - 1
 
 
 def test_a_target_has_the_same_bytes_every_time(package, coarse, tmp_path):
