@@ -6,7 +6,12 @@ smoothness has to answer. Of several stiffnesses, kinds of stretching and refere
 face in hindsight, which no method may. What it misses by, these landmarks and this kind of smoothness (bending and
 stretching of a displacement) cannot give; other landmarks, or a prior learned from faces, might.
 
-The second measure asks whether the surfaces' shape could. Relief is the mean height of the surface within 1.2 cm over
+It still is told too much: where the surface is curved, its true tangent planes hold a vertex that would slide along it.
+The drift is what the registration's own energy makes of the truth: closest points hold it to the surface as they hold
+any other answer, landmarks and lines are the picked ones, and it may slide. Where it goes is the energy's nearest
+minimum; a registration that is as good as that has nothing to gain from a better search, only from another energy.
+
+The last measure asks whether the surfaces' shape could. Relief is the mean height of the surface within 1.2 cm over
 the tangent plane, as a share of the radius. Where the oracle is off by more than 0.8 %, compare the source's relief
 with the target's at the true point and at the oracle's: where the latter fits better, this
 measure of shape leads away from the truth; where the true one fits better, there is something left to use.
@@ -24,12 +29,16 @@ from scipy.spatial import cKDTree
 from toolkit.feature_lines import FeatureLine
 from toolkit.mesh import TriangleMesh, vertex_adjacency, vertex_areas, vertex_normals
 from toolkit.operators import uniform_laplacian
+from toolkit.registration import Landmarks, RegistrationParameters
 from toolkit.registration.coarse import Gather, decimate
+from toolkit.registration.fit import reduce
+from toolkit.registration.nonrigid import accepted, field_constraints, field_energy
+from toolkit.registration.prepare import prepare
 from toolkit.registration.spline import ThinPlateSpline
 from toolkit.rigid import umeyama
 from toolkit.solve import factorise
 
-__all__ = ["Floor", "floor", "relief_misfits"]
+__all__ = ["Floor", "drifted", "floor", "relief_misfits"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -41,9 +50,10 @@ _OFF, _RADIUS, _SAMPLED = 0.8, 1.2, 1500
 
 @dataclass(frozen=True)
 class Floor:
-    """The best smooth answer in hindsight, ``vertices`` (V, 3), and what it was found with."""
+    """The best smooth answer in hindsight, ``vertices`` (V, 3), its mean error, and what it was found with."""
 
     vertices: Array
+    error: float
     stiffness: float
     stretching: float
     blend: float
@@ -52,13 +62,13 @@ class Floor:
 def floor(
     source: TriangleMesh,
     truth: Array,
-    face: Mask,
+    regions: dict[str, Mask],
     ids: NDArray[np.integer],
     lines: list[FeatureLine],
     skin: Mask,
     size: int = 4000,
-) -> Floor:
-    """The oracle's best answer on ``size`` vertices by the mean error over ``face`` (V,); ``ids`` are the landmarks."""
+) -> dict[str, Floor]:
+    """The oracle's best on ``size`` vertices for each region ``(V,)`` by its mean error; ``ids`` are the landmarks."""
     coarse = decimate(source, size)
     gather, prolong, n = Gather(coarse), coarse.prolong, coarse.mesh.n_vertices
     true = gather.fit(truth)
@@ -74,7 +84,7 @@ def floor(
     right = right + _LANDMARK * (picked.T @ truth[ids].T.ravel())
     laplacian, adjacency = uniform_laplacian(coarse.mesh.triangles, n), vertex_adjacency(coarse.mesh.triangles, n)
     membrane = sp.diags(np.asarray(adjacency.sum(axis=1)).ravel()) - adjacency
-    best, least = None, np.inf
+    best: dict[str, Floor] = {}
     for stretching in _STRETCHING:
         # The same balance of bending and stretching as the registration's, at this mesh's size.
         scale = n / 1e4
@@ -85,11 +95,46 @@ def floor(
             for blend in _BLENDS:
                 reference = ((1 - blend) * rigid + blend * bent).T.ravel()
                 found = prolong @ factor.solve(smooth @ reference + right).reshape(3, n).T
-                error = float(np.linalg.norm(found - truth, axis=1)[face].mean())
-                if error < least:
-                    best, least = Floor(found, stiffness, stretching, blend), error
-    assert best is not None
+                error = np.linalg.norm(found - truth, axis=1)
+                for name, mask in regions.items():
+                    mean = float(error[mask].mean())
+                    if name not in best or mean < best[name].error:
+                        best[name] = Floor(found, mean, stiffness, stretching, blend)
     return best
+
+
+def drifted(
+    source: TriangleMesh,
+    target: TriangleMesh,
+    truth: Array,
+    landmarks: Landmarks,
+    lines: list[FeatureLine],
+    size: int = 4000,
+    rounds: int = 8,
+) -> Array:
+    """Where the truth slides to, ``(V, 3)``, held by what the registration knows: its energy's minimum nearby.
+
+    As `toolkit.registration.nonrigid.solve_field` at its last stiffness, but that vertices are held to the tangent
+    planes of their closest points, not to the points, so that they are free to slide.
+    """
+    given = RegistrationParameters(resolution=size)
+    job = prepare(source, target, landmarks, lines)
+    known = reduce(job, size)
+    mesh, prolong, n = known.coarse.mesh, known.coarse.prolong, known.coarse.mesh.n_vertices
+    energy = given.stiffness_last * field_energy(mesh, known.skin, given.membrane)
+    held = list(field_constraints(known.coarse, job.posed, (job.ids, job.points), job.curves, given))
+    three, field = sp.identity(3), known.gather.fit(truth) - mesh.vertices
+    alike = energy + 1e-3 * sp.identity(n) + sum(c.weight * (c.rows.T @ c.rows) for c in held)
+    for _ in range(rounds):
+        now = mesh.vertices + field
+        hits = job.surface.closest(now, known.labels)
+        use = accepted(hits, vertex_normals(now, mesh.triangles), job.extent, given) & known.skin
+        across = _side_by_side(hits.normals * use[:, None])
+        gaps = np.einsum("nd,nd->n", hits.normals, hits.points - mesh.vertices) * use
+        right = energy @ known.reference + 1e-3 * field + sum(c.weight * (c.rows.T @ c.wanted(field)) for c in held)
+        matrix = sp.csc_matrix(sp.kron(three, alike) + across.T @ across)
+        field = factorise(matrix).solve(right.T.ravel() + across.T @ gaps).reshape(3, n).T
+    return job.posed + prolong @ field
 
 
 def _side_by_side(directions: Array) -> sp.csr_matrix:

@@ -1,7 +1,8 @@
 import numpy as np
 
-from benchmarks._registration.floor import floor, relief_misfits
-from benchmarks._registration.guides import GUIDES, guide_lines, sample_stops
+from benchmarks._registration.floor import drifted, floor, relief_misfits
+from data.guides import guide_lines
+from toolkit.registration import Landmarks
 
 
 def test_the_oracle_finds_a_map_that_smoothness_gives(pair):
@@ -9,11 +10,30 @@ def test_the_oracle_finds_a_map_that_smoothness_gives(pair):
     source, skin = pair.source.mesh, ~pair.source.bag
     turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     moved = 1.3 * source.vertices @ turn.T + 2
-    kept = floor(source, moved, skin, pair.landmarks.source, [], skin, 500).vertices
+    kept = floor(source, moved, {"skin": skin}, pair.landmarks.source, [], skin, 500)["skin"].vertices
     assert np.linalg.norm(kept - moved, axis=1)[skin].mean() < 0.01  # what the decimated mesh cannot express
-    best = floor(source, pair.truth, skin, pair.landmarks.source, [], skin, 500)
+    best = floor(source, pair.truth, {"skin": skin}, pair.landmarks.source, [], skin, 500)["skin"]
     error = np.linalg.norm(best.vertices - pair.truth, axis=1)[skin]
-    assert 1e-6 < error.mean() < 0.004 * pair.target.mesh.diagonal
+    assert best.error == error.mean()
+    assert 1e-6 < best.error < 0.004 * pair.target.mesh.diagonal
+
+
+def test_the_truth_drifts_only_as_far_as_landmarks_leave_it_free(pair):
+    """Nothing draws a similar shape away; another person's slides, the farther the fewer landmarks."""
+    source, target, skin = pair.source.mesh, pair.target.mesh, ~pair.source.bag
+    size = target.diagonal
+
+    def drift(onto, truth, marks):
+        gone = drifted(source, onto, truth, marks, [], 500)
+        return np.linalg.norm(gone - truth, axis=1)[skin].mean() / size
+
+    few = Landmarks.of(pair.landmarks.source[::3], pair.landmarks.target[::3])
+    itself = Landmarks.of(pair.landmarks.source, pair.landmarks.source)
+    moved = 1.3 * source.vertices + 2
+    still = drift(source.with_vertices(moved), moved, itself)
+    near, far = drift(target, pair.truth, pair.landmarks), drift(target, pair.truth, few)
+    assert still < 0.004  # what the decimated mesh cannot express
+    assert near < far < 0.05
 
 
 def test_true_lines_bring_the_oracle_nearer(pair):
@@ -25,10 +45,7 @@ def test_true_lines_bring_the_oracle_nearer(pair):
     lines = guide_lines(source, pair.target.mesh, pair.truth, stops, 2.4)
     assert len(lines) == 1
     assert len(lines[0].target_vertices) > 10
-    errors = [
-        np.linalg.norm(floor(source, pair.truth, skin, ids, x, skin, 500).vertices - pair.truth, axis=1)[skin].mean()
-        for x in ([], lines)
-    ]
+    errors = [floor(source, pair.truth, {"skin": skin}, ids, x, skin, 500)["skin"].error for x in ([], lines)]
     assert errors[1] < errors[0]
 
 
@@ -41,13 +58,3 @@ def test_relief_tells_a_place_from_another(pair):
     assert off == 1
     assert true < 1e-12
     assert there > 0.01
-
-
-def test_guides_are_on_both_sides_and_the_midline_once():
-    words = {word for line in GUIDES.values() for word in line.split()}
-    middle = {word for word in words if word in set(GUIDES["midline_upper"].split() + GUIDES["midline_lower"].split())}
-    names = {name: k for k, name in enumerate(sorted(middle))}
-    names |= {f"{w}_{s}": 100 + k for k, (w, s) in enumerate((w, s) for w in sorted(words - middle) for s in "lr")}
-    stops = sample_stops(names)
-    assert len(stops) == 2 * len(GUIDES) - 2
-    assert {"midline_upper_l", "jaw_l", "jaw_r"} <= set(stops)

@@ -18,7 +18,7 @@ from toolkit.registration.parameters import RegistrationParameters
 from toolkit.registration.surface import Hits, Surface
 from toolkit.solve import factorise
 
-__all__ = ["SheetedSurface", "accepted", "solve_field"]
+__all__ = ["SheetedSurface", "accepted", "field_constraints", "field_energy", "solve_field"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -108,9 +108,9 @@ def solve_field(
     landmarks : source ids (N,) and target points (N, 3)
     """
     mesh, size = coarse.mesh, coarse.mesh.n_vertices
-    energy = _energy(mesh, skin, parameters.membrane)
+    energy = field_energy(mesh, skin, parameters.membrane)
     pull = energy @ reference
-    constraints = list(_constraints(coarse, posed, landmarks, curves, parameters))
+    constraints = list(field_constraints(coarse, posed, landmarks, curves, parameters))
     field = np.zeros((size, 3))
     steps = np.geomspace(parameters.stiffness_first, parameters.stiffness_last, parameters.stiffness_steps)
     total = len(steps) * parameters.rounds
@@ -129,7 +129,7 @@ def solve_field(
     return field
 
 
-def _energy(mesh: TriangleMesh, skin: Mask, membrane: float) -> sp.csr_matrix:
+def field_energy(mesh: TriangleMesh, skin: Mask, membrane: float) -> sp.csr_matrix:
     """Bending and stretching ``(C, C)`` of the skin; what is behind it is a membrane only.
 
     Bending would carry the slope at a lid's rim on into the socket, where nothing holds it, and out through the
@@ -147,13 +147,14 @@ def _energy(mesh: TriangleMesh, skin: Mask, membrane: float) -> sp.csr_matrix:
     return sp.csr_matrix(energy)
 
 
-def _constraints(
+def field_constraints(
     coarse: Coarse,
     posed: Array,
     landmarks: tuple[NDArray[np.int64], Array],
     curves: Sequence[Curve],
     parameters: RegistrationParameters,
 ) -> Iterator[_Constraint]:
+    """Landmarks and curves as rows of the field, in ``solve_field``'s terms."""
     ids, points = landmarks
     yield _Constraint(coarse.prolong[ids], posed[ids], parameters.landmark_weight, goals=points)
     for curve in curves:
