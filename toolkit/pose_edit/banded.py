@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky_banded
 from scipy.linalg.lapack import dgetrf, dgetrs
 
-from toolkit.compiled import njit
+from toolkit.compiled import DisjointArrays, njit
 
 __all__ = ["FrameRows", "SmallFactor", "System", "chain_bands", "frame_bands"]
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
+
+_OPTIONS = {"cache": True, "nogil": True, "fastmath": {"contract"}, "boundscheck": False, "error_model": "numpy"}
 
 
 @dataclass(frozen=True)
@@ -137,18 +139,14 @@ class _Chains:
         self._factor = bands
 
     def solve(self, right: Array) -> Array:
-        solved = right[:, None].copy()
-        _substitute_chains(self._factor, solved, 0)
-        return solved[:, 0]
+        solved = right.copy()
+        _substitute_chains(self._factor, solved)
+        return solved
 
     def answers(self, rows: FrameRows) -> Array:
-        """``B P^-1 B^T`` (R, R), from the columns of ``P^-1`` at the rows' frames."""
-        _, n, n_bases = self._factor.shape
+        """``B P^-1 B^T`` (R, R), from ``P^-1`` at pairs of the rows' frames."""
         frames, which = rows.distinct
-        columns = np.zeros((n, len(frames), n_bases))
-        columns[frames, np.arange(len(frames))] = 1
-        _substitute_chains(self._factor, columns, int(frames.min(initial=n)))
-        return np.asarray(_between_rows(rows.local, rows.frames, which, columns))
+        return np.asarray(_between_rows(rows.local, which, _between_frames(self._factor, frames)))
 
 
 class _Frames:
@@ -174,7 +172,7 @@ class _Frames:
         return np.asarray(halves.T @ halves)
 
 
-@njit(cache=True, nogil=True)
+@njit(**_OPTIONS)
 def _factorise_chains(bands):  # type: ignore[no-untyped-def]  # compiled
     """``L D L^T`` of five bands, in place: (3, n, K) becomes 1 / D and L's two diagonals."""
     _, n, count = bands.shape
@@ -190,43 +188,71 @@ def _factorise_chains(bands):  # type: ignore[no-untyped-def]  # compiled
             beside[k] = near * second[k]
 
 
-@njit(cache=True, nogil=True)
-def _substitute_chains(factor, columns, start):  # type: ignore[no-untyped-def]  # compiled
-    """Solve in place for ``columns`` (n, C, K) that are zero before row ``start``; the rows before it are left so."""
-    n, n_columns, count = columns.shape
-    for i in range(start + 1, n):
-        first, second = factor[1, i - 1], factor[2, max(i - 2, 0)]
-        for c in range(n_columns):
-            x, near, far = columns[i, c], columns[i - 1, c], columns[max(i - 2, 0), c]
-            for k in range(count):
-                x[k] -= first[k] * near[k]
-            if i > start + 1:
-                for k in range(count):
-                    x[k] -= second[k] * far[k]
-    for i in range(n - 1, start - 1, -1):
+@njit(**_OPTIONS)
+def _substitute_chains(factor, right):  # type: ignore[no-untyped-def]  # compiled
+    """Solve in place for ``right`` (n, K)."""
+    _forward_chains(factor, right, 0)
+    n, count = right.shape
+    for i in range(n - 1, -1, -1):
         inverse, first, second = factor[0, i], factor[1, i], factor[2, i]
         # Beyond the end the bands are zero.
-        for c in range(n_columns):
-            x, near, far = columns[i, c], columns[min(i + 1, n - 1), c], columns[min(i + 2, n - 1), c]
+        x, near, far = right[i], right[min(i + 1, n - 1)], right[min(i + 2, n - 1)]
+        for k in range(count):
+            x[k] = x[k] * inverse[k] - first[k] * near[k] - second[k] * far[k]
+
+
+@njit(**_OPTIONS)
+def _forward_chains(factor, right, start):  # type: ignore[no-untyped-def]  # compiled
+    """``L^-1 right`` in place for ``right`` (n, K) that is zero before row ``start``."""
+    n, count = right.shape
+    for i in range(start + 1, n):
+        # The one before ``start`` is zero, and so is what stands for the one before the first.
+        before = max(i - 2, 0)
+        x, near, far, first, second = right[i], right[i - 1], right[before], factor[1, i - 1], factor[2, before]
+        for k in range(count):
+            x[k] -= first[k] * near[k]
+        if i > 1:
             for k in range(count):
-                x[k] = x[k] * inverse[k] - first[k] * near[k] - second[k] * far[k]
+                x[k] -= second[k] * far[k]
 
 
-@njit(cache=True, nogil=True)
-def _between_rows(local, frames, which, columns):  # type: ignore[no-untyped-def]  # compiled
-    """``sum_k local[a, k] columns[frames[a], which[b], k] local[b, k]``, symmetric, (R, R)."""
+@njit(**_OPTIONS)
+def _between_frames(factor, frames):  # type: ignore[no-untyped-def]  # compiled
+    """``P^-1`` (F, F, K) of every curve at pairs of ``frames``, from below: ``(L^-1 e_f)^T D^-1 (L^-1 e_g)``."""
+    _, n, count = factor.shape
+    halves, between = np.zeros((len(frames), n, count)), np.zeros((len(frames), len(frames), count))
+    for a in range(len(frames)):
+        halves[a, frames[a]] = 1
+        _forward_chains(factor, halves[a], frames[a])
+        for b in range(a + 1):
+            _add_products(halves[a], halves[b], factor[0], max(frames[a], frames[b]), between[a, b])
+            between[b, a] = between[a, b]
+    return between
+
+
+@njit(pipeline_class=DisjointArrays, **_OPTIONS)
+def _add_products(x, y, scale, start, total):  # type: ignore[no-untyped-def]  # compiled
+    """``total[k] += sum_i x[i, k] y[i, k] scale[i, k]`` from row ``start`` on."""
+    for i in range(start, len(x)):
+        for k in range(len(total)):
+            total[k] += x[i, k] * y[i, k] * scale[i, k]
+
+
+@njit(**_OPTIONS)
+def _between_rows(local, which, between):  # type: ignore[no-untyped-def]  # compiled
+    """``sum_k local[a, k] between[which[a], which[b], k] local[b, k]``, symmetric, (R, R)."""
     n_rows, count = local.shape
-    between = np.empty((n_rows, n_rows))
+    result = np.empty((n_rows, n_rows))
     for a in range(n_rows):
         for b in range(a + 1):
             total = 0.0
             for k in range(count):
-                total += local[a, k] * columns[frames[a], which[b], k] * local[b, k]
-            between[a, b] = between[b, a] = total
-    return between
+                total += local[a, k] * between[which[a], which[b], k] * local[b, k]
+            result[a, b] = result[b, a] = total
+    return result
 
 
-@njit(cache=True, nogil=True)
+@njit(**_OPTIONS)
 def _forward(factor, columns, first):  # type: ignore[no-untyped-def]  # compiled
     """``L^-1 columns`` (N, C) in place, from row ``first`` on; ``factor`` (N, W) holds L's columns, diagonal first."""
     n, width = factor.shape
@@ -239,7 +265,7 @@ def _forward(factor, columns, first):  # type: ignore[no-untyped-def]  # compile
                 columns[i + j, c] -= factor[i, j] * columns[i, c]
 
 
-@njit(cache=True, nogil=True)
+@njit(**_OPTIONS)
 def _backward(factor, columns):  # type: ignore[no-untyped-def]  # compiled
     """``L^-T columns`` (N, C) in place."""
     n, width = factor.shape

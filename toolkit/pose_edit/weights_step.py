@@ -108,29 +108,30 @@ class WeightsProblem:
     def _interior_point(self, gradient: _Gradient, start: Array) -> tuple[Array, Array]:
         """A change just inside the bounds, and the force that each bound takes."""
         slack = np.maximum(start - self.lower, _INSIDE)
-        change = self.lower + slack
-        slope = gradient(change)
+        slope = gradient(self.lower + slack)
         force = np.maximum(slope, 0) + max(float(np.abs(slope).mean()), 1e-300)
         goal = _CLOSE * float(np.mean(np.abs(gradient(np.zeros_like(start)))))
         for _ in range(_MOST_STEPS):
             gap = float(np.mean(slack * force))
             if gap <= goal:
                 break
-            system = gradient.system(extra=force / slack)
-            rest = gradient(change) - force
-            move = system.solve(-rest - force)
-            push = -force - force * move / slack
+            stiff = force / slack
+            system = gradient.system(extra=stiff)
+            move = system.solve(-slope)
+            push = -force - stiff * move
             length = min(_longest(slack, move), _longest(force, push))
             ahead = float(np.mean((slack + length * move) * (force + length * push)))
             centre = gap * (ahead / gap) ** 3
             # Second order: what the first step would leave of slack times force.
             short = (centre - move * push) / slack
-            move = system.solve(-rest - force + short)
-            push = short - force - force * move / slack
+            pull = short - slope
+            move = system.solve(pull)
+            push = short - force - stiff * move
             length = 0.995 * min(_longest(slack, move), _longest(force, push))
+            # The gradient is linear, and the system has just told what it makes of the move.
+            slope = slope + length * (pull - stiff * move)
             slack, force = slack + length * move, force + length * push
-            change = self.lower + slack
-        return change, force
+        return self.lower + slack, force
 
     def _finish(self, gradient: _Gradient, active: NDArray[np.bool_], near: Array) -> Array:
         """The exact solution with some weights at zero, these corrected a few times; ``near`` if that is better."""
