@@ -70,7 +70,8 @@ def _replace_folder(new: Path, path: Path) -> None:
     except BaseException:
         os.rename(old, path)
         raise
-    shutil.rmtree(old, ignore_errors=True)
+    # Nobody waits for it but the end of the process: some systems take half a second to give up half a gigabyte.
+    threading.Thread(target=shutil.rmtree, args=(old,), kwargs={"ignore_errors": True}, name="remove").start()
 
 
 @contextmanager
