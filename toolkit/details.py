@@ -113,7 +113,7 @@ class Reconstruction:
         # The moves to all bases, and the rest shape, whose weight is one.
         self._shapes = np.empty((len(bases) + 1, smooth.size), dtype=np.float32)
         for k, shape in enumerate([*(basis - smooth for basis in bases), smooth - origin]):
-            self._shapes[k] = shape[order].ravel()
+            np.take(shape.astype(np.float32), order, axis=0, out=self._shapes[k].reshape(-1, 3), mode="clip")
         self._own = target.rest.detail[order].astype(np.float32)
         self._gain = np.asarray(gain, dtype=np.float32)[order]
         self._turns, self._starts = _placed(motion, pose, origin)
