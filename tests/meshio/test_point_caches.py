@@ -1,4 +1,5 @@
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -134,3 +135,15 @@ def test_a_cancelled_cache_leaves_nothing(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         cache_as_npy(open_sequence(save(tmp_path / "a.npy")), tmp_path / "cache" / "a.npy", cancel)
     assert list((tmp_path / "cache").iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="asks Linux what is mapped")
+@pytest.mark.parametrize("suffix", [".npy", ".pc2", ".mdd"])
+def test_what_was_read_does_not_stay_mapped(tmp_path, suffix):
+    path = save(tmp_path / f"take{suffix}")
+    sequence = open_sequence(path)
+    block = sequence.view(2, 6)
+    np.testing.assert_array_equal(block, FRAMES[2:6])
+    assert (str(path) in Path("/proc/self/maps").read_text()) == (suffix != ".mdd")  # its byte order is turned
+    del block
+    assert str(path) not in Path("/proc/self/maps").read_text()

@@ -82,8 +82,19 @@ def _map(path: Path, dtype: str, offset: int, n_frames: int, n_points: int, fps:
     if present < n_frames:
         what = f"the header says {n_frames} frames of {n_points} points, but the file holds {max(present, 0)}"
         raise InputError(what, where=path, remedy="it is cut short, copy or export it again")
-    frames = np.memmap(path, dtype=dtype, mode="r", offset=offset, shape=(n_frames, n_points, 3))
-    return FrameSequence(n_frames, n_points, fps, str(path), lambda start, stop: frames[start:stop])
+    return _mapped(path, np.dtype(dtype), offset, (n_frames, n_points), fps)
+
+
+def _mapped(path: Path, dtype: np.dtype, offset: int, shape: tuple[int, int], fps: float | None) -> FrameSequence:
+    """Frames ``(T, V, 3)`` from ``offset`` on; only blocks in use are mapped: no process holds all of a take."""
+    n_frames, n_points = shape
+    size = 3 * n_points * dtype.itemsize
+
+    def read_block(start: int, stop: int) -> NDArray:
+        block = (stop - start, n_points, 3)
+        return np.memmap(path, dtype=dtype, mode="r", offset=offset + start * size, shape=block)
+
+    return FrameSequence(n_frames, n_points, fps, str(path), read_block)
 
 
 def _load(path: Path, load: Callable[[], Any]) -> Any:
@@ -107,4 +118,6 @@ def _of_array(frames: NDArray, fps: float | None, path: Path) -> FrameSequence:
         raise InputError(f"has an array of shape {getattr(frames, 'shape', ())}", where=path, remedy=_SHAPE)
     if frames.dtype.kind not in "fiu":
         raise InputError(f"has an array of type {frames.dtype}, not of numbers", where=path, remedy=_SHAPE)
+    if isinstance(frames, np.memmap) and frames.flags.c_contiguous:
+        return _mapped(path, frames.dtype, frames.offset, frames.shape[:2], fps)
     return FrameSequence(frames.shape[0], frames.shape[1], fps, str(path), lambda start, stop: frames[start:stop])
