@@ -117,12 +117,12 @@ def _run_stages(app: App, which: Any) -> None:
         seconds = sum(float(report["seconds"]) for report in reports)
         ran = [report["stage"] for report in reports if not report["skipped"]]
         app.say(f"{', '.join(ran) or 'nothing to do'}: done in {seconds:.1f} s", "good")
-        first = not app.data.has_registration
         app.reload()
-        if "register" in ran and (first or stages == ["register"]):
-            app.choose_pair("registration")
-        elif "result" in ran:
-            app.choose_pair("performance")
+        made = next((pair for stage, pair in _MADE.items() if stage in ran), None)
+        if made is not None:
+            if app.mode.pairs and made not in app.mode.pairs:
+                app.choose_mode("look")
+            app.choose_pair(made)
 
     def failed(error: Exception) -> None:
         stopped = isinstance(error, Cancelled)
@@ -130,6 +130,10 @@ def _run_stages(app: App, which: Any) -> None:
         app.reload()
 
     app.run_task("running", work, done, failed=failed)
+
+
+_MADE = {"result": "performance", "register": "registration"}
+"""The last stage that was run, and the views to look at it with."""
 
 
 def _escape(app: App, shift: bool) -> None:

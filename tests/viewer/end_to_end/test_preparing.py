@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 from data.samples import SamplePaths
 from toolkit.feature_lines import load_feature_lines
 from toolkit.shot import Shot
+from toolkit.stages import run_stages
 from viewer.picking import Picker
 from viewer.state.cameras import Viewpoint
 from viewer.state.shot_data import ShotData
@@ -77,3 +79,22 @@ def _four_round_the_mouth(data: ShotData, samples: SamplePaths) -> list[int]:
         if len(ids) == 4 and picker.visible(np.asarray(ids), camera).all():
             return [int(v) for v in ids]
     raise AssertionError("no line of the sample can be seen from the front")
+
+
+def test_all_steps_run_from_an_unregistered_shot_to_the_performance(
+    raw_shot: Path, samples: SamplePaths, sit_down: Callable
+) -> None:
+    shutil.copyfile(samples.targets["asian_female"].feature_lines, raw_shot / "feature_lines.json")
+    desk = sit_down(raw_shot)
+    assert desk.state["pair"] == "references"
+    desk.button("run:all")
+    state = desk.wait(lambda state: state["editable"])
+    desk.picture("all_run")
+    assert (state["pair"], state["mode"]) == ("performance", "look")
+    assert "run:all" not in state["widgets"]
+    assert all(report.skipped for report in run_stages(Shot(raw_shot)))
+    assert np.load(raw_shot / "result" / "frames.npy", mmap_mode="r").shape[0] == ShotData(Shot(raw_shot)).n_frames
+    desk.key("space")
+    desk.wait(lambda state: state["playing"] and state["frame"] > 3)
+    desk.key("space")
+    desk.close()

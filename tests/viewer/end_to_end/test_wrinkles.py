@@ -109,3 +109,35 @@ def test_a_kill_keeps_the_open_edit_but_for_the_drag(shot: Path, sit_down: Calla
     (edit,) = edits(shot)
     assert edit.data["constraints"] == kept["pose"]["constraints"]
     again.close()
+
+
+def test_a_kill_in_the_middle_of_a_stroke_loses_only_the_stroke(shot: Path, sit_down: Callable) -> None:
+    data = ShotData(Shot(shot))
+    _, vertex = wrinkle(shot, data)
+    desk = sit_down(shot)
+    desk.wait(lambda state: state["editable"])
+    desk.key("5")
+    desk.wait(lambda state: state["mode"] == "detail" and "remove" in state["widgets"])
+    x, y = desk.pixel(1, data.result[0][vertex], data.target_framing)
+    desk.drag((x - 10, y), (x + 10, y))
+    desk.wait()
+    kept = json.loads((shot / "drafts.json").read_text())
+    desk.press(x - 10, y + 40)
+    for step in range(5):
+        desk.move(x + 10 * step, y + 40)
+    desk.kill()
+    assert json.loads((shot / "drafts.json").read_text()) == kept
+    assert edits(shot) == ()
+
+    again = sit_down(shot)
+    again.wait(lambda state: state["editable"])
+    again.key("5")
+    again.wait(lambda state: state["mode"] == "detail" and "commit" in state["widgets"])
+    again.button("remove")
+    again.wait()
+    again.key("Return")
+    again.wait(lambda state: len(state["edits"]) == 1)
+    (edit,) = edits(shot)
+    assert edit.data["region"] == kept["detail"]["region"]
+    assert edit.data["factor"] == 0
+    again.close()
