@@ -17,7 +17,7 @@ from toolkit.rendering import Camera
 from viewer.state.cameras import pixel_size
 from viewer.state.marks import Curve, Disc, Mark
 
-__all__ = ["CORNERS", "Triangles", "build", "triangles_for", "wire_triangles", "wires"]
+__all__ = ["CORNERS", "Triangles", "build", "triangles_for", "uncrowded", "wire_triangles", "wires"]
 
 Array = NDArray[np.float64]
 Triangles = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -46,6 +46,16 @@ def build(marks: Sequence[Mark], camera: Camera, height: float) -> Triangles:
             corners.append(points.reshape(-1, 3))
             colors.append(np.repeat(each, 3 * _SIDES, axis=0))
     return np.concatenate(corners).astype(np.float32), np.concatenate(colors).astype(np.float32)
+
+
+def uncrowded(places: Array, width: float, height: float) -> list[int]:
+    """Of words at ``places`` (n, 2), all about as large, those that cover none before them, in their order."""
+    kept: list[int] = []
+    for index, place in enumerate(places):
+        apart = np.abs(places[kept] - place)
+        if not ((apart[:, 0] < width) & (apart[:, 1] < height)).any():
+            kept.append(index)
+    return kept
 
 
 def triangles_for(capacity: int) -> NDArray[np.int32]:

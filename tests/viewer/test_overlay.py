@@ -59,3 +59,9 @@ def test_wires_are_bands_along_the_edges() -> None:
     areas = [np.linalg.det([flat[b] - flat[a], flat[c] - flat[a]]) for a, b, c in triangles]
     assert areas[0] * areas[1] > 0
     assert areas[2] * areas[3] > 0
+
+
+def test_words_that_would_cover_others_are_left_out() -> None:
+    places = np.array([[100.0, 100.0], [112.0, 104.0], [112.0, 130.0], [130.0, 104.0], [131.0, 104.0]])
+    assert overlay.uncrowded(places, 20.0, 13.0) == [0, 2, 3]
+    assert overlay.uncrowded(np.zeros((0, 2)), 20.0, 13.0) == []

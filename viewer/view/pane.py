@@ -12,7 +12,7 @@ from viewer.layout import Rectangle
 from viewer.state.app import App
 from viewer.state.cameras import pixel_ray
 from viewer.state.events import Pointer
-from viewer.state.marks import Disc, Text
+from viewer.state.marks import YELLOW, Disc, Text
 from viewer.view import open3d_calls as native
 from viewer.view.open3d_calls import DynamicMesh, gui
 from viewer.view.wires import Wires
@@ -21,6 +21,8 @@ __all__ = ["Pane"]
 
 _IVORY = np.array([[0.86, 0.85, 0.82]], np.float32)
 _LABELS = 96
+_LABEL_ROOM = (20.0, 13.0)
+"""Width and height, on a plain screen, within which there is one number only."""
 _USUAL_MARKS = 4096
 """Triangles of marks that are made room for at once: a mesh that replaces a smaller one costs a blink of the window."""
 
@@ -142,14 +144,18 @@ class Pane:
             self.app.touch("faces")
 
     def _draw_labels(self, marks: Any) -> None:
-        """Numbers beside discs, of those that the face does not hide."""
+        """Numbers beside discs, of those that the face does not hide and that find room, the chosen one's first."""
         app = self.app
-        wanted = [mark for mark in marks if (isinstance(mark, Disc | Text)) and mark.text][:_LABELS]
+        wanted = [mark for mark in marks if (isinstance(mark, Disc | Text)) and mark.text]
+        wanted.sort(key=lambda mark: mark.color != YELLOW)
         if wanted:
             camera = app.framing_camera(self.index)
             places = np.array([mark.position for mark in wanted])
             seen = app.picker(self.index).sees(places, camera) if not app.play.playing else np.ones(len(wanted), bool)
             wanted = [mark for mark, shown in zip(wanted, seen, strict=True) if shown]
+            pixels = camera.project(places[seen], app.pane_sizes[self.index])[:, :2]
+            room = np.multiply(_LABEL_ROOM, app.density)
+            wanted = [wanted[k] for k in overlay.uncrowded(pixels, *room)[:_LABELS]]
         while len(self._labels) < len(wanted):
             self._labels.append(self.widget.add_3d_label(np.zeros(3, np.float32), ""))
         for label, mark in zip(self._labels, wanted, strict=False):
