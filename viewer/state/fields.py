@@ -49,8 +49,7 @@ def scaled(name: str, values: NDArray[np.floating], unit: str, least: float = 0.
     finite = values[np.isfinite(values)]
     high = float(np.percentile(finite, _PERCENTILE[name])) if len(finite) else 0.0
     high = max(high, least)
-    cmap = {"difference": "magma", "coating": "viridis", "distance": "viridis"}[name]
-    return Field(values, ColorScale(0.0, _round_up(high), label, unit, cmap))
+    return Field(values, ColorScale(0.0, _round_up(high), label, unit))
 
 
 def _round_up(value: float) -> float:

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 __all__ = ["Maps"]
 
 _UNIT = "the target's unit"
-# Of the face's height: what a registration may well be off by.
-_FAR = 0.004
+# Of the face's height: what a registration may well be off by, and the least difference that anybody sees.
+_FAR, _SEEN = 0.004, 1e-4
 
 
 class Maps:
@@ -68,7 +68,8 @@ class Maps:
         known = self._known.get("difference")
         if known is None or known[0][0] is not before or known[0][1] is not after:
             apart = np.linalg.norm(after.vertices - before.vertices, axis=1)
-            known = self._known["difference"] = ((before, after), scaled("difference", apart, _UNIT))
+            least = _SEEN * self._app.data.target_framing.height
+            known = self._known["difference"] = ((before, after), scaled("difference", apart, _UNIT, least))
         return known[1]
 
     def _of_coating(self, surface: Surface) -> Field | None:
