@@ -8,8 +8,9 @@ stretching of a displacement) cannot give; other landmarks, or a prior learned f
 
 It still is told too much: where the surface is curved, its true tangent planes hold a vertex that would slide along it.
 The drift is what the registration's own energy makes of the truth: closest points hold it to the surface as they hold
-any other answer, landmarks and lines are the picked ones, and it may slide. Where it goes is the energy's nearest
-minimum; a registration that is as good as that has nothing to gain from a better search, only from another energy.
+any other answer, landmarks and lines are the picked ones, and it may slide. Where it stops is the energy's minimum,
+and sliding on from the registration's own answer leads there as well; a registration that is as good as that has
+nothing to gain from a better search, only from another energy.
 
 The last measure asks whether the surfaces' shape could. Relief is the mean height of the surface within 1.2 cm over
 the tangent plane, as a share of the radius. Where the oracle is off by more than 0.8 %, compare the source's relief
@@ -32,7 +33,7 @@ from toolkit.operators import uniform_laplacian
 from toolkit.registration import Landmarks, RegistrationParameters
 from toolkit.registration.coarse import Gather, decimate
 from toolkit.registration.fit import reduce
-from toolkit.registration.nonrigid import accepted, field_constraints, field_energy
+from toolkit.registration.nonrigid import FieldConstraint, accepted, field_constraints, field_energy
 from toolkit.registration.prepare import prepare
 from toolkit.registration.spline import ThinPlateSpline
 from toolkit.rigid import umeyama
@@ -45,6 +46,8 @@ Mask = NDArray[np.bool_]
 
 _STIFFNESS, _STRETCHING, _BLENDS = (0.1, 1.0, 10.0), (0.0, 0.003, 0.03), (0.0, 0.5, 1.0)
 _LANDMARK, _LINE = 100.0, 5.0
+_SCREEN = 1e-3
+"""Drag in each round of the drift, against 1 for a vertex's plane."""
 _OFF, _RADIUS, _SAMPLED = 0.8, 1.2, 1500
 
 
@@ -115,26 +118,40 @@ def drifted(
     """Where the truth slides to, ``(V, 3)``, held by what the registration knows: its energy's minimum nearby.
 
     As `toolkit.registration.nonrigid.solve_field` at its last stiffness, but that vertices are held to the tangent
-    planes of their closest points, not to the points, so that they are free to slide.
+    planes of their closest points, and lines to the lines across them, not to points: they are free to slide.
     """
     given = RegistrationParameters(resolution=size)
     job = prepare(source, target, landmarks, lines)
     known = reduce(job, size)
-    mesh, prolong, n = known.coarse.mesh, known.coarse.prolong, known.coarse.mesh.n_vertices
+    mesh, n = known.coarse.mesh, known.coarse.mesh.n_vertices
     energy = given.stiffness_last * field_energy(mesh, known.skin, given.membrane)
     held = list(field_constraints(known.coarse, job.posed, (job.ids, job.points), job.curves, given))
-    three, field = sp.identity(3), known.gather.fit(truth) - mesh.vertices
-    alike = energy + 1e-3 * sp.identity(n) + sum(c.weight * (c.rows.T @ c.rows) for c in held)
+    field = known.gather.fit(truth) - mesh.vertices
     for _ in range(rounds):
         now = mesh.vertices + field
         hits = job.surface.closest(now, known.labels)
         use = accepted(hits, vertex_normals(now, mesh.triangles), job.extent, given) & known.skin
-        across = _side_by_side(hits.normals * use[:, None])
+        planes = _side_by_side(hits.normals * use[:, None])
         gaps = np.einsum("nd,nd->n", hits.normals, hits.points - mesh.vertices) * use
-        right = energy @ known.reference + 1e-3 * field + sum(c.weight * (c.rows.T @ c.wanted(field)) for c in held)
-        matrix = sp.csc_matrix(sp.kron(three, alike) + across.T @ across)
-        field = factorise(matrix).solve(right.T.ravel() + across.T @ gaps).reshape(3, n).T
-    return job.posed + prolong @ field
+        matrix = sp.kron(sp.identity(3), energy + _SCREEN * sp.identity(n)) + planes.T @ planes
+        right = (energy @ known.reference + _SCREEN * field).T.ravel() + planes.T @ gaps
+        for constraint in held:
+            rows, values = _sliding(constraint, field)
+            matrix, right = matrix + constraint.weight * (rows.T @ rows), right + constraint.weight * (rows.T @ values)
+        field = factorise(sp.csc_matrix(matrix)).solve(right).reshape(3, n).T
+    return job.posed + known.coarse.prolong @ field
+
+
+def _sliding(constraint: FieldConstraint, field: Array) -> tuple[sp.csr_matrix, Array]:
+    """Rows ``(3 M, 3 C)`` and values of a constraint, for lines without what points along them."""
+    rows, wanted = sp.kron(sp.identity(3), constraint.rows).tocsr(), constraint.wanted(field).T.ravel()
+    if constraint.polyline is None:
+        return rows, wanted
+    along = np.gradient(constraint.start + constraint.rows @ field, axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    lengthwise = _side_by_side(along)
+    across = sp.identity(len(wanted)) - lengthwise.T @ lengthwise
+    return sp.csr_matrix(across @ rows), across @ wanted
 
 
 def _side_by_side(directions: Array) -> sp.csr_matrix:

@@ -18,7 +18,7 @@ from toolkit.registration.parameters import RegistrationParameters
 from toolkit.registration.surface import Hits, Surface
 from toolkit.solve import factorise
 
-__all__ = ["SheetedSurface", "accepted", "field_constraints", "field_energy", "solve_field"]
+__all__ = ["FieldConstraint", "SheetedSurface", "accepted", "field_constraints", "field_energy", "solve_field"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -54,7 +54,7 @@ class SheetedSurface:
 
 
 @dataclass(frozen=True)
-class _Constraint:
+class FieldConstraint:
     """Rows of the field with wanted values: to fixed ``goals`` (n, 3), or to the nearest points of a polyline."""
 
     rows: sp.csr_matrix
@@ -153,12 +153,12 @@ def field_constraints(
     landmarks: tuple[NDArray[np.int64], Array],
     curves: Sequence[Curve],
     parameters: RegistrationParameters,
-) -> Iterator[_Constraint]:
+) -> Iterator[FieldConstraint]:
     """Landmarks and curves as rows of the field, in ``solve_field``'s terms."""
     ids, points = landmarks
-    yield _Constraint(coarse.prolong[ids], posed[ids], parameters.landmark_weight, goals=points)
+    yield FieldConstraint(coarse.prolong[ids], posed[ids], parameters.landmark_weight, goals=points)
     for curve in curves:
         rows = coarse.prolong[curve.vertices]
         # A fine curve has more points than the coarse mesh has vertices along it: the weight is per coarse vertex.
         density = min(1.0, np.count_nonzero(rows.getnnz(axis=0)) / len(curve.vertices))
-        yield _Constraint(rows, posed[curve.vertices], parameters.line_weight * density, polyline=curve.points)
+        yield FieldConstraint(rows, posed[curve.vertices], parameters.line_weight * density, polyline=curve.points)
