@@ -39,3 +39,20 @@ def test_the_weights_step_equals_a_dense_bounded_solve(with_opening: bool, with_
         at_bound = int((found == problem.lower).sum())
         assert 0 < at_bound < found.size if room < 1 else at_bound == 0
         assert np.abs(found.ravel() - slow.x).max() < 1e-7
+
+
+def test_a_drag_needs_no_interior_point(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the last solution on, the next one is found by its zeros alone, and is the same."""
+    rng = np.random.default_rng(3)
+    n, k = 60, 5
+    problem = WeightsProblem(time_matrix(n, True, True, smoothness=3.0), None, -0.2 * rng.uniform(0, 1, (n, k)) ** 2)
+    rows = FrameRows(np.array([20, 30, 45]), rng.normal(size=(3, k)))
+    goals, metric = rng.normal(size=3), 0.1 * np.eye(3)
+    last = problem.solve(rows, goals, metric, np.zeros((n, k)))
+    assert 0 < (last == problem.lower).sum() < last.size
+    asked = [1.02 * goals, 1.04 * goals, goals]
+    cold = [problem.solve(rows, one, metric, np.zeros((n, k))) for one in asked]
+    monkeypatch.setattr(WeightsProblem, "_interior_point", None)
+    for one, other in zip(asked, cold, strict=True):
+        last = problem.solve(rows, one, metric, last)
+        assert np.abs(last - other).max() < 1e-9

@@ -7,8 +7,8 @@ With ``u = w' - w`` the change of the weights, ``(n, K)`` over the window's n fr
 ``Q`` holds what changes in time cost, ``G`` what moving the fixed vertices costs, the diagonal ``H_t`` what opening
 closed lids and lips costs, ``B`` how the few constrained frames answer. A primal-dual interior point method
 (Mehrotra's): each of its 15 to 20 steps is one banded factorisation, the few rows of ``B`` by Woodbury's formula.
-Active sets alone creep here, since a curve that bends slowly leaves zero one frame at a time; they only finish: weights
-that the interior point leaves next to zero become exactly zero.
+Active sets alone creep here, since a curve that bends slowly leaves zero one frame at a time; they finish, where the
+interior point leaves weights next to zero, and follow a drag, where few weights come to zero or leave it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ __all__ = ["WeightsProblem", "time_matrix"]
 Array = NDArray[np.float64]
 
 _MOST_STEPS = 60
-_MOST_CORRECTIONS = 2
+# Corrections of which weights are zero, from the last solution's and from the interior point's.
+_FEW_CORRECTIONS = 5
+_MOST_CORRECTIONS = 16
 # A gain, as a share of the energy, that is not worth a solve with bounds.
 _NOTHING = 1e-3
 # Complementarity, as a share of its start, at which the interior point stops.
@@ -100,10 +102,14 @@ class WeightsProblem:
         now = gradient.energy(start)
         if now - gradient.energy(free) <= _NOTHING * now:
             return start
+        # While a point is dragged, what was zero mostly stays so.
+        change, settled = self._held(gradient, start <= self.lower, start, _FEW_CORRECTIONS)
+        if settled:
+            return change
         change, force = self._interior_point(gradient, start)
         pulled = float(np.abs(gradient(np.zeros_like(start))).max())
         active = change - self.lower < force / max(pulled, 1e-300)
-        return self._finish(gradient, active, change)
+        return self._held(gradient, active, change, _MOST_CORRECTIONS)[0]
 
     def _interior_point(self, gradient: _Gradient, start: Array) -> tuple[Array, Array]:
         """A change just inside the bounds, and the force that each bound takes."""
@@ -133,19 +139,27 @@ class WeightsProblem:
             slack, force = slack + length * move, force + length * push
         return self.lower + slack, force
 
-    def _finish(self, gradient: _Gradient, active: NDArray[np.bool_], near: Array) -> Array:
-        """The exact solution with some weights at zero, these corrected a few times; ``near`` if that is better."""
+    def _held(self, gradient: _Gradient, active: NDArray[np.bool_], near: Array, tries: int) -> tuple[Array, bool]:
+        """The solution with the ``active`` weights at zero, these corrected a few times, and whether it is exact.
+
+        ``near`` if that is better.
+        """
         best, least = np.where(active, self.lower, near), gradient.energy(near)
-        for _ in range(_MOST_CORRECTIONS):
+        at_first = active.size
+        for done in range(tries):
             bound = np.where(active, self.lower, 0.0)
             change = bound + gradient.system(stuck=active).solve(-gradient(bound))
             slope = gradient(change)
             wrong = (~active & (change < self.lower)) | (active & (slope < 0))
-            if not wrong.any():
+            count = int(np.count_nonzero(wrong))
+            if count == 0:
+                return change, True
+            if count > at_first:
                 break
+            at_first = at_first if done else count
             active = active ^ wrong
         change = np.maximum(change, self.lower)
-        return change if gradient.energy(change) <= least else best
+        return (change if gradient.energy(change) <= least else best), False
 
 
 class _Gradient:
