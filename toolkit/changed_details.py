@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.decomposition import Decomposer
-from toolkit.kernels import block_frames, opposite_edges, rotate_details
+from toolkit.frame_kernels import block_frames, opposite_edges, rotate_details
 from toolkit.mesh.patch import FramePatch
 
 __all__ = ["ChangedDetails", "DetailsChange"]

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from toolkit.decomposition import Decomposer
-from toolkit.kernels import block_frames
+from toolkit.frame_kernels import block_frames
 from toolkit.mesh.topology import vertex_adjacency
 from toolkit.solve import factorise
 

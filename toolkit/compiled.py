@@ -9,7 +9,7 @@ from typing import Any
 import numba
 from numba.core.compiler import Compiler
 
-__all__ = ["DisjointArrays", "njit"]
+__all__ = ["ARITHMETIC", "LOOPS", "DisjointArrays", "njit"]
 
 log = logging.getLogger(__name__)
 
@@ -25,6 +25,12 @@ class DisjointArrays(Compiler):
         """Numba's own passes."""
         self.state.flags.noalias = True
         return super().define_pipelines()
+
+
+LOOPS = {"cache": True, "nogil": True, "fastmath": {"contract"}, "boundscheck": False, "error_model": "numpy"}
+"""Options of loops over arrays; "contract": a product and a sum in one instruction, sums in the order written."""
+ARITHMETIC = LOOPS | {"pipeline_class": DisjointArrays}
+"""For what calculates. Of what only copies some is slower so: vectorised, it gathers numbers one by one."""
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

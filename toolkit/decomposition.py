@@ -16,9 +16,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from toolkit.blocks import scratch
-from toolkit.kernels import block_to_frames, frames_to_block, longest_in_plane, opposite_edges, take_details
+from toolkit.frame_kernels import block_frames, longest_in_plane, opposite_edges, take_details
+from toolkit.kernels import block_to_frames, frames_to_block
 from toolkit.mesh.core import TriangleMesh
-from toolkit.mesh.geometry import local_frames
 from toolkit.mesh.topology import connected_components, vertex_adjacency
 from toolkit.meshio.sequence import FrameSequence
 from toolkit.operators import uniform_laplacian
@@ -70,14 +70,15 @@ class Decomposer:
         smooth = np.asarray(self.filter.smooth(mesh.vertices), dtype=np.float64)
         if neighbour is None:
             neighbour = frame_neighbours(smooth, mesh.triangles)
-        frames = local_frames(smooth, mesh.triangles, neighbour)
-        detail = np.einsum("vji,vj->vi", frames, mesh.vertices - smooth)
-        self.rest = RestShape(smooth, detail, np.asarray(neighbour, dtype=np.int64))
         self.block = BlockNumbering(self.filter, mesh.triangles, neighbour)
         order = self.filter.order
-        self._smooth32 = (smooth - smooth.mean(axis=0))[order].astype(np.float32)
-        self._offset32 = (mesh.vertices - smooth)[order].astype(np.float32)
-        self._detail32 = detail[order].astype(np.float32)
+        ordered, offset = smooth[order], (mesh.vertices - smooth)[order]
+        own = np.einsum("vjit,vj->vi", block_frames(ordered[:, :, None], *self.block.stencil), offset)
+        detail = np.empty_like(own)
+        detail[order] = own
+        self.rest = RestShape(smooth, detail, np.asarray(neighbour, dtype=np.int64))
+        self._smooth32 = (ordered - smooth.mean(axis=0)).astype(np.float32)
+        self._offset32, self._detail32 = offset.astype(np.float32), own.astype(np.float32)
 
     def decompose(
         self, frames: NDArray[np.float32], motion: HeadMotion, start: int

@@ -20,7 +20,8 @@ from toolkit.changed_details import ChangedDetails, DetailsChange
 from toolkit.coating_details import CoatingDetails
 from toolkit.decomposition import Decomposer
 from toolkit.errors import InputError
-from toolkit.kernels import block_to_frames, place_block, renumber_frames, rotate_details
+from toolkit.frame_kernels import rotate_details
+from toolkit.kernels import block_to_frames, place_block, renumber_frames
 from toolkit.mesh.geometry import vertex_areas
 from toolkit.rigid import Similarity
 from toolkit.stabilisation import HeadMotion

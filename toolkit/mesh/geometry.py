@@ -55,7 +55,7 @@ def local_frames(vertices: Array, triangles: NDArray[np.integer], neighbour: NDA
 
     The tangent is the edge from each vertex to ``neighbour[v]`` projected on the tangent plane (Sorkine et al. 2004;
     the paper's section 5.1), so a frame turns with the surface. The same ``neighbour`` must be used for the source
-    and the target. Slow, clear version; blocks of frames go through ``toolkit.kernels``.
+    and the target. Slow, clear version; blocks of frames go through ``toolkit.frame_kernels``.
     """
     normal = vertex_normals(vertices, triangles)
     edge = vertices[neighbour] - vertices

@@ -51,7 +51,7 @@ STAGES: dict[str, Stage] = {
             ("inputs",),
             ("stabilise", "smoothing"),
             decompose.work,
-            version=7,
+            version=8,
             by_frames=True,
             reads=("source_vertices.npy", "source_triangles.npy"),
         ),
