@@ -6,7 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from toolkit.blocks import block_ranges, map_blocks
 from toolkit.decomposition import Decomposer, coating, decompose_block, frame_neighbours, reconstruct_from_coating
+from toolkit.frame_kernels import opposite_edges
 from toolkit.mesh import TriangleMesh, connected_components, local_frames
+from toolkit.mesh.geometry import vertex_normals
 from toolkit.meshio.sequence import FrameSequence
 from toolkit.operators import smoothing_average
 from toolkit.smoothing import apply_steps
@@ -93,6 +95,28 @@ def test_neighbours_are_neighbours(bump: TriangleMesh) -> None:
     assert all((v, w) in edges or (w, v) in edges for v, w in enumerate(neighbour))
     lonely = np.vstack([bump.vertices, [[9.0, 9, 9]]])
     assert frame_neighbours(lonely, bump.triangles)[-1] == bump.n_vertices
+
+
+def test_neighbours_are_the_longest_in_the_tangent_plane(bump: TriangleMesh) -> None:
+    """Against the definition, vertex by vertex; of equal ones any will do."""
+    neighbour = frame_neighbours(bump.vertices, bump.triangles)
+    normals = vertex_normals(bump.vertices, bump.triangles)
+
+    def in_plane(v: int, w: int) -> float:
+        edge = bump.vertices[w] - bump.vertices[v]
+        return float(np.linalg.norm(edge - (edge @ normals[v]) * normals[v]))
+
+    for v in range(bump.n_vertices):
+        ring = np.unique(bump.triangles[(bump.triangles == v).any(axis=1)])
+        assert in_plane(v, neighbour[v]) == pytest.approx(max(in_plane(v, w) for w in ring), rel=1e-9)
+
+
+def test_opposite_edges_are_turned_as_their_triangles(bump: TriangleMesh) -> None:
+    starts, edges = opposite_edges(bump.triangles, bump.n_vertices + 1)
+    assert starts[-1] == starts[-2] == len(edges) == 3 * bump.n_triangles  # the last vertex is in none
+    for v in (0, 17, 400, bump.n_vertices - 1):
+        expected = [np.roll(t, -k)[1:] for t in bump.triangles for k in np.flatnonzero(t == v)]
+        assert np.array_equal(edges[starts[v] : starts[v + 1]], expected)
 
 
 def test_an_error_in_a_block_is_raised(bump: TriangleMesh, take: np.ndarray) -> None:

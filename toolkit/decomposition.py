@@ -124,8 +124,7 @@ def decompose_block(
     details: NDArray[np.float32],
 ) -> None:
     """Decompose frames ``start <= t < stop`` into ``smooth_deltas`` and ``details``, both ``(B, V, 3)`` float32."""
-    frames = sequence.read(start, stop, out=scratch("frames", smooth_deltas.shape))
-    smooth, detail = decomposer.decompose(frames, motion, start)
+    smooth, detail = decomposer.decompose(sequence.view(start, stop), motion, start)
     block_to_frames(smooth, decomposer.filter.position, smooth_deltas)
     block_to_frames(detail, decomposer.filter.position, details)
 

@@ -61,3 +61,14 @@ def test_a_file_with_a_passing_name_is_no_error(tmp_path: Path, monkeypatch: pyt
         (folder / "passing").write_bytes(b"1")
         assert gone.wait(30)
     assert list((tmp_path / "stage").iterdir()) == []
+
+
+def test_what_was_there_is_removed_meanwhile(tmp_path: Path) -> None:
+    for content in (b"old", b"new"):
+        with folder_aside(tmp_path / "stage") as folder:
+            (folder / "a").write_bytes(content)
+    assert (tmp_path / "stage" / "a").read_bytes() == b"new"
+    for thread in threading.enumerate():
+        if thread.name == "remove":
+            thread.join(30)
+    assert [path.name for path in tmp_path.iterdir()] == ["stage"]

@@ -46,16 +46,10 @@ class FrameSequence:
     def __len__(self) -> int:
         return self.n_frames
 
-    def read(
-        self,
-        start: int,
-        stop: int,
-        vertices: NDArray[np.integer] | None = None,
-        out: NDArray[np.float32] | None = None,
-    ) -> NDArray[np.float32]:
+    def read(self, start: int, stop: int, vertices: NDArray[np.integer] | None = None) -> NDArray[np.float32]:
         """Return frames ``start <= t < stop`` as ``(stop - start, V, 3)`` float32, a copy of the caller's own.
 
-        With ``vertices`` (n,) only these, ``(stop - start, n, 3)``; in ``out`` if that is given.
+        With ``vertices`` (n,) only these, ``(stop - start, n, 3)``.
         """
         block = self._block(start, stop)
         return np.array(block if vertices is None else block[:, vertices], dtype=np.float32, order="C")
