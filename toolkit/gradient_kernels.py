@@ -8,15 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.compiled import DisjointArrays, njit
+from toolkit.compiled import ARITHMETIC, LOOPS, njit
 
 __all__ = ["add_pulls", "invert_edge_frames", "largest_changes"]
 
-_OPTIONS = {"cache": True, "nogil": True, "fastmath": {"contract"}, "boundscheck": False, "error_model": "numpy"}
-_ARITHMETIC = _OPTIONS | {"pipeline_class": DisjointArrays}
 
-
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def invert_edge_frames(vertices, triangles, inverse, squared):
     """``inverse`` (F, 3, 3) of ``E``, and ``squared`` (F,) of ``|e0 x e1|``; a zero there makes the inverse nonsense.
 
@@ -37,7 +34,7 @@ def invert_edge_frames(vertices, triangles, inverse, squared):
         squared[f] = square
 
 
-@njit(forceinline=True, **_OPTIONS)
+@njit(forceinline=True, **LOOPS)
 def _edges(vertices, triangles, f):
     """``e0``, ``e1`` and the three numbers of ``e0 x e1``."""
     a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
@@ -46,7 +43,7 @@ def _edges(vertices, triangles, f):
     return e, g, e[1] * g[2] - e[2] * g[1], e[2] * g[0] - e[0] * g[2], e[0] * g[1] - e[1] * g[0]
 
 
-@njit(**_ARITHMETIC)
+@njit(**ARITHMETIC)
 def _frame_changes(rest, changes, triangles, f, out):
     """How the triangle's ``E`` changes in every shape, ``out`` (3, 3, K), its columns first."""
     a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
@@ -65,7 +62,7 @@ def _frame_changes(rest, changes, triangles, f, out):
         out[2, 0, k], out[2, 1, k], out[2, 2, k] = x * scale - nx, y * scale - ny, z * scale - nz
 
 
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def largest_changes(rest, inverse, changes, triangles, out):
     """``out`` (F,): the largest ``|J - I|^2`` of the shapes, Frobenius norm, ``J`` the deformation gradient."""
     frame = np.empty((3, 3, changes.shape[2]))
@@ -74,7 +71,7 @@ def largest_changes(rest, inverse, changes, triangles, out):
         out[f] = _largest(frame, inverse[f])
 
 
-@njit(**_ARITHMETIC)
+@njit(**ARITHMETIC)
 def _largest(frame, inverse):
     largest = 0.0
     for k in range(frame.shape[2]):
@@ -87,7 +84,7 @@ def _largest(frame, inverse):
     return largest
 
 
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def add_pulls(rest, inverse, changes, triangles, gradients, weights, out):
     """``out[i] += w_f (J_f - I) g_i`` for every corner i of every triangle, ``out`` (V, 3, K).
 
@@ -107,7 +104,7 @@ def add_pulls(rest, inverse, changes, triangles, gradients, weights, out):
         _scatter(frame, share, triangles[f, 0], triangles[f, 1], triangles[f, 2], out)
 
 
-@njit(**_ARITHMETIC)
+@njit(**ARITHMETIC)
 def _scatter(frame, share, a, b, c, out):
     for i in range(3):
         for k in range(frame.shape[2]):

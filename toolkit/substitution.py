@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.compiled import DisjointArrays, njit
+from toolkit.compiled import ARITHMETIC, LOOPS, njit
 
 __all__ = ["substitute", "without_zeros"]
 
-_OPTIONS = {"cache": True, "nogil": True, "fastmath": {"contract"}, "boundscheck": False, "error_model": "numpy"}
 
-
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def without_zeros(starts, rows, values):
     """The same ``L`` without the zeros that supernodes are filled up with; rows unsigned, which index faster."""
     count = np.count_nonzero(values)
@@ -29,7 +27,7 @@ def without_zeros(starts, rows, values):
     return kept_starts, kept_rows, kept_values
 
 
-@njit(pipeline_class=DisjointArrays, **_OPTIONS)
+@njit(**ARITHMETIC)
 def substitute(starts, rows, values, order, first, last, right, out):
     """``out <- A^-1 right`` in columns ``first <= c < last`` of both (n, m), for ``A[order][:, order] = L L^T``.
 

@@ -16,14 +16,12 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky_banded
 from scipy.linalg.lapack import dgetrf, dgetrs
 
-from toolkit.compiled import DisjointArrays, njit
+from toolkit.compiled import ARITHMETIC, LOOPS, njit
 
 __all__ = ["FrameRows", "SmallFactor", "System", "chain_bands", "frame_bands"]
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
-
-_OPTIONS = {"cache": True, "nogil": True, "fastmath": {"contract"}, "boundscheck": False, "error_model": "numpy"}
 
 
 @dataclass(frozen=True)
@@ -172,7 +170,7 @@ class _Frames:
         return np.asarray(halves.T @ halves)
 
 
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def _factorise_chains(bands):  # type: ignore[no-untyped-def]  # compiled
     """``L D L^T`` of five bands, in place: (3, n, K) becomes 1 / D and L's two diagonals."""
     _, n, count = bands.shape
@@ -188,7 +186,7 @@ def _factorise_chains(bands):  # type: ignore[no-untyped-def]  # compiled
             beside[k] = near * second[k]
 
 
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def _substitute_chains(factor, right):  # type: ignore[no-untyped-def]  # compiled
     """Solve in place for ``right`` (n, K)."""
     _forward_chains(factor, right, 0)
@@ -201,7 +199,7 @@ def _substitute_chains(factor, right):  # type: ignore[no-untyped-def]  # compil
             x[k] = x[k] * inverse[k] - first[k] * near[k] - second[k] * far[k]
 
 
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def _forward_chains(factor, right, start):  # type: ignore[no-untyped-def]  # compiled
     """``L^-1 right`` in place for ``right`` (n, K) that is zero before row ``start``."""
     n, count = right.shape
@@ -216,7 +214,7 @@ def _forward_chains(factor, right, start):  # type: ignore[no-untyped-def]  # co
                 x[k] -= second[k] * far[k]
 
 
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def _between_frames(factor, frames):  # type: ignore[no-untyped-def]  # compiled
     """``P^-1`` (F, F, K) of every curve at pairs of ``frames``, from below: ``(L^-1 e_f)^T D^-1 (L^-1 e_g)``."""
     _, n, count = factor.shape
@@ -230,7 +228,7 @@ def _between_frames(factor, frames):  # type: ignore[no-untyped-def]  # compiled
     return between
 
 
-@njit(pipeline_class=DisjointArrays, **_OPTIONS)
+@njit(**ARITHMETIC)
 def _add_products(x, y, scale, start, total):  # type: ignore[no-untyped-def]  # compiled
     """``total[k] += sum_i x[i, k] y[i, k] scale[i, k]`` from row ``start`` on."""
     for i in range(start, len(x)):
@@ -238,7 +236,7 @@ def _add_products(x, y, scale, start, total):  # type: ignore[no-untyped-def]  #
             total[k] += x[i, k] * y[i, k] * scale[i, k]
 
 
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def _between_rows(local, which, between):  # type: ignore[no-untyped-def]  # compiled
     """``sum_k local[a, k] between[which[a], which[b], k] local[b, k]``, symmetric, (R, R)."""
     n_rows, count = local.shape
@@ -252,7 +250,7 @@ def _between_rows(local, which, between):  # type: ignore[no-untyped-def]  # com
     return result
 
 
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def _forward(factor, columns, first):  # type: ignore[no-untyped-def]  # compiled
     """``L^-1 columns`` (N, C) in place, from row ``first`` on; ``factor`` (N, W) holds L's columns, diagonal first."""
     n, width = factor.shape
@@ -265,7 +263,7 @@ def _forward(factor, columns, first):  # type: ignore[no-untyped-def]  # compile
                 columns[i + j, c] -= factor[i, j] * columns[i, c]
 
 
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def _backward(factor, columns):  # type: ignore[no-untyped-def]  # compiled
     """``L^-T columns`` (N, C) in place."""
     n, width = factor.shape
