@@ -17,7 +17,7 @@ from viewer.legend import draw_legend
 from viewer.script import Player, Recorder
 from viewer.stalls import StallWatch
 from viewer.state.app import App
-from viewer.state.events import Event, Key
+from viewer.state.events import Command, Event, Key
 from viewer.state.look import help_groups
 from viewer.view import open3d_calls as native
 from viewer.view.open3d_calls import gui, image_of
@@ -82,7 +82,7 @@ class Window:
         self._last = time.monotonic()
         self._settle = 3
         self._again: list[float] = []
-        self._quitting = False
+        self._quitting = self._asked_to_close = False
         self._stale, self._was_busy = True, False
         self._ticks = 0
 
@@ -178,6 +178,9 @@ class Window:
             self.stalls.begin()
         self.panel.tick()
         self.app.tick(min(passed, 0.5))
+        if self._asked_to_close:
+            self._asked_to_close = False
+            self.send(Command("quit"))
         if self.app.quit_asked and not self._quitting:
             self._quitting = True
             native.quit_later(self.application, self.window)
@@ -261,11 +264,14 @@ class Window:
             (self._held.add if down else self._held.discard)(held)
             return False
         name = native.key_name(event)
+        if name == "escape":
+            self._asked_to_close = False
         if not down or name is None:
             return False
         self.send(Key(name, tuple(sorted(self._held))))
         return True
 
     def _closing(self) -> bool:
-        self.app.mode.leave()
-        return True
+        """Asked by the frame's button, and by Open3D before every Escape, as its key event tells after that."""
+        self._asked_to_close = True
+        return self._quitting

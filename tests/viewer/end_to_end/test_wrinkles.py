@@ -133,6 +133,11 @@ def test_a_kill_in_the_middle_of_a_stroke_loses_only_the_stroke(shot: Path, sit_
     again.wait(lambda state: state["editable"])
     again.key("5")
     again.wait(lambda state: state["mode"] == "detail" and "commit" in state["widgets"])
+    again.key("Escape")  # gives the edit up; Open3D would end the process
+    again.wait(lambda state: "given up" in state["status"])
+    assert not (shot / "drafts.json").exists()
+    again.key("z")
+    again.wait(lambda state: "given up" not in state["status"] or (shot / "drafts.json").exists())
     again.button("remove")
     again.wait()
     again.key("Return")
