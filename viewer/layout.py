@@ -9,7 +9,7 @@ __all__ = ["PANEL", "Places", "Rectangle", "arrange"]
 PANEL = 24.0
 """The panel's width, in heights of the type (em), as all sizes here."""
 _BUTTONS, _TIMES, _STATUS = 2.1, 7.0, 1.9
-_PROGRESS = 11.0
+_PROGRESS, _CANCEL = 11.0, 4.5
 _LEGEND = (17.0, 3.6)
 _LEAST_WIDTH, _LEAST_HEIGHT = 12.0, 6.0
 
@@ -60,6 +60,7 @@ class Places:
     floor: Rectangle
     status: Rectangle
     progress: Rectangle
+    cancel: Rectangle
 
 
 def arrange(whole: Rectangle, em: float) -> Places:
@@ -72,7 +73,7 @@ def arrange(whole: Rectangle, em: float) -> Places:
     left = Rectangle(whole.x, whole.y, half - 1, height)
     right = Rectangle(whole.x + half + 1, whole.y, width - half - 1, height)
     floor = Rectangle(whole.x, low + buttons + times, whole.width, status)
-    bar = round(_PROGRESS * em)
+    bar, button = round(_PROGRESS * em), round(_CANCEL * em)
     return Places(
         (left, right),
         (_title(left, em), _title(right, em)),
@@ -82,8 +83,11 @@ def arrange(whole: Rectangle, em: float) -> Places:
         Rectangle(whole.x, low, width, buttons),
         Rectangle(whole.x, low + buttons, width, times),
         floor,
-        Rectangle(floor.x + round(0.5 * em), floor.y, max(floor.width - bar - round(em), 1), status),
-        Rectangle(floor.right - bar, floor.y + round(0.4 * em), bar - round(0.5 * em), status - round(0.8 * em)),
+        Rectangle(floor.x + round(0.5 * em), floor.y, max(floor.width - bar - button - round(em), 1), status),
+        Rectangle(
+            floor.right - bar - button, floor.y + round(0.4 * em), bar - round(0.5 * em), status - round(0.8 * em)
+        ),
+        Rectangle(floor.right - button, floor.y + round(0.15 * em), button - round(0.5 * em), status - round(0.3 * em)),
     )
 
 

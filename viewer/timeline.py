@@ -55,7 +55,12 @@ class Layout:
     @property
     def curves(self) -> tuple[float, float]:
         """The curves, top and bottom."""
-        return 40 * self.scale, self.height - 4 * self.scale
+        return 55 * self.scale, self.height - 4 * self.scale
+
+    @property
+    def title(self) -> float:
+        """The top of the words over the curves."""
+        return 39 * self.scale
 
     def x(self, frame: float) -> float:
         """Where a frame is."""
@@ -188,7 +193,7 @@ def _draw_ruler(pen: ImageDraw.ImageDraw, layout: Layout, shown: Timeline) -> No
 
 def _draw_curves(pen: ImageDraw.ImageDraw, layout: Layout, shown: Timeline) -> None:
     typeface = font(round(11 * layout.scale))
-    top = layout.curves[0] - 1
+    top = layout.title
     weights = [curve for curve in (shown.source, shown.edited) if curve is not None and len(curve)]
     high = max((float(np.max(curve)) for curve in weights), default=0.0)
     for curve, color in ((shown.source, _SOURCE), (shown.edited, _EDITED)):

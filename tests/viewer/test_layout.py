@@ -29,7 +29,15 @@ def test_the_parts_cover_the_window_and_do_not_overlap(size: tuple[int, int], em
 @pytest.mark.parametrize("size", SIZES)
 def test_everything_is_inside_and_of_some_size(size: tuple[int, int]) -> None:
     places = arrange(Rectangle(0, 0, *size), 16)
-    for part in (*places.panes, *places.titles, places.legend, places.status, places.progress, places.times):
+    for part in (
+        *places.panes,
+        *places.titles,
+        places.legend,
+        places.status,
+        places.progress,
+        places.cancel,
+        places.times,
+    ):
         assert part.width >= 1
         assert part.height >= 1
         assert 0 <= part.x <= part.right <= size[0]
@@ -41,7 +49,7 @@ def test_everything_is_inside_and_of_some_size(size: tuple[int, int]) -> None:
 
 def test_a_screen_of_twice_the_density_shows_the_same_twice_as_large() -> None:
     once, twice = arrange(Rectangle(0, 0, 1280, 720), 16), arrange(Rectangle(0, 0, 2560, 1440), 32)
-    for name in ("legend", "panel", "buttons", "times", "floor", "status", "progress"):
+    for name in ("legend", "panel", "buttons", "times", "floor", "status", "progress", "cancel"):
         np.testing.assert_allclose(2 * np.array(astuple(getattr(once, name))), astuple(getattr(twice, name)), atol=3)
     for one, other in zip(once.panes, twice.panes, strict=True):
         np.testing.assert_allclose(2 * np.array(astuple(one)), astuple(other), atol=3)

@@ -64,12 +64,12 @@ def test_a_gain_is_drawn_to_its_own_scale_with_words() -> None:
     shown = Timeline(0, 30.0, source=np.full(100, 9.0), gain=gain)
     image = draw(layout, shown).astype(int)
     green = (image[:, :, 1] > image[:, :, 0] + 60) & (image[:, :, 1] > image[:, :, 2] + 60)
-    rows = [np.flatnonzero(green[int(layout.curves[0]) + 14 :, round(layout.x(t))]) for t in (10, 40)]
+    rows = [np.flatnonzero(green[int(layout.curves[0]) :, round(layout.x(t))]) for t in (10, 40)]
     top, bottom = layout.curves
     for t, found in zip((10, 40), rows, strict=True):
-        wanted = bottom - (bottom - top) * gain[t] / 2 - int(top) - 14
+        wanted = bottom - (bottom - top) * gain[t] / 2 - int(top)
         assert abs(found.mean() - wanted) < 2
-    assert green[int(top) : int(top) + 10, 400:].any()  # its words
+    assert green[int(layout.title) : int(top), 400:].any()  # its words
 
 
 def test_what_is_kept_between_frames_changes_nothing() -> None:

@@ -48,7 +48,7 @@ class ExportMode(Mode):
     def rows(self) -> Sequence[Row]:
         """Formats, the button, what was written."""
         rows: list[Row] = [Check(f"format:{name}", words, name in self._chosen) for name, words in _FORMATS]
-        ready = self.app.data.has_result and bool(self._chosen) and not self.app.worker.busy
+        ready = self.app.data.has_result and bool(self._chosen) and self.app.worker.progress is None
         rows.append(Button("export now", "Export", ready))
         rows.append(Note(f"into {self.app.shot.export_folder}", "quiet"))
         count = sum(edit.on for edit in self.app.editing.edits)
@@ -76,7 +76,8 @@ class ExportMode(Mode):
 
         def done(reports: list[dict[str, Any]]) -> None:
             self._written = [_in_words(report) for report in reports]
-            self.app.say(f"{len(reports)} exported to {self.app.shot.export_folder}", "good")
+            count = f"{len(reports)} format{'s' if len(reports) > 1 else ''}"
+            self.app.say(f"{count} exported to {self.app.shot.export_folder}", "good")
             self.app.result_written()
 
         def failed(error: Exception) -> None:

@@ -68,7 +68,7 @@ class FeatureLineMode(Mode):
         known = 0 <= self.chosen < len(self._lines)
         name = self._name if drawing or not known else self._lines[self.chosen].name
         rows: list[Row] = [
-            Items("line", words, self.chosen, 10),
+            Items("line", words, self.chosen, 10, "no lines yet"),
             Entry("line name", "name", name),
             Buttons(
                 (

@@ -79,7 +79,13 @@ class History(Mode):
         shown, edits = editing.snapshot, editing.edits
         chosen = self.chosen
         rows: list[Row] = [
-            Items("edit", tuple(line(edit) for edit in edits), edits.index(chosen) if chosen in edits else -1, _ROWS),
+            Items(
+                "edit",
+                tuple(line(edit) for edit in edits),
+                edits.index(chosen) if chosen in edits else -1,
+                _ROWS,
+                "no edits yet",
+            ),
             Buttons(
                 (
                     Button("undo", "Undo (z)", shown.can_undo is not None),
@@ -172,7 +178,7 @@ class History(Mode):
             self.number = edits[-1].number
         shown = self.app.editing.snapshot
         if shown is not None and shown.has_draft:
-            self.app.editing.call("showing the face", lambda session, _: session.drop_draft(), slot="draft", quiet=True)
+            self.app.editing.drop_draft()
 
     def panel(self, name: str, value: Any, final: bool) -> None:
         """A row was used."""

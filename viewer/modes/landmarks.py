@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["LandmarkMode", "Pair"]
 
 _GRAB = 9.0  # pixels
+_ROUNDING = 1e-5  # of the face's height
+_LEAST = 3  # pairs that tell where a face is
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ class LandmarkMode(Mode):
         words = [
             f"{number:3d}  {pair.name}   {_id(pair.source)} - {_id(pair.target)}" for number, pair in self._numbered
         ]
-        rows: list[Row] = [Items("landmark", tuple(words), self.chosen, 12)]
+        rows: list[Row] = [Items("landmark", tuple(words), self.chosen, 12, "no landmarks yet")]
         chosen = self._pairs[self.chosen] if 0 <= self.chosen < len(self._pairs) else None
         rows.append(Entry("landmark name", "name", chosen.name if chosen else ""))
         rows.append(
@@ -101,9 +103,12 @@ class LandmarkMode(Mode):
         )
         rows.append(Note(f"{self.count} pairs, kept in {self.app.shot.landmarks_path.name} as you pick", "quiet"))
         steps = self.app.steps
-        if steps is not None and not steps.problem and not self.app.worker.busy:
+        if steps is not None and not steps.problem:
             label = "Register again" if self.app.data.has_registration else "Register"
-            rows.append(Button("run:register", label, self.count >= 3 or steps.done("register")))
+            enough = self.count >= _LEAST or steps.done("register")
+            rows.append(Button("run:register", label, enough and self.app.worker.progress is None))
+            if not enough:
+                rows.append(Note(f"to register, pick {_LEAST} pairs at least", "quiet"))
         if self.app.data.has_registration:
             numbers = (self.app.shot.manifest("register") or {}).get("numbers", {})
             rows += _report(numbers)
@@ -283,13 +288,16 @@ def _report(numbers: dict[str, Any]) -> list[Row]:
     """What the registration said of itself."""
     rows: list[Row] = []
     if "distance_95_share" in numbers:
-        median, most = (_percent(numbers[name]) for name in ("distance_median_share", "distance_95_share"))
-        words = f"distance: {median} of the face (median), {most} (95th percentile)"
-        rows.append(Note(words, "quiet"))
-        rows.append(Note(f"worst landmark: {numbers.get('landmark_worst', '')}", "quiet"))
+        most = numbers["distance_95_share"]
+        words = (
+            f"95 % of it nearer than {_percent(most)} to the target" if most > _ROUNDING else "it lies on the target"
+        )
+        rows.append(Note(f"registered: {words}", "quiet"))
+        far = _percent(numbers.get("landmark_worst_share", 0.0))
+        rows.append(Note(f"worst landmark: {numbers.get('landmark_worst', '')}, {far} of the face away", "quiet"))
     rows += [Note(str(warning), "bad") for warning in numbers.get("warnings", [])[:3]]
     return rows
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %" if share > 1e-5 else "nothing"
+    return f"{100 * share:.2g} %"

@@ -38,20 +38,23 @@ def panel_rows(app: App) -> list[Row]:
 
 def _next_rows(app: App) -> list[Row]:
     """What to do next, as long as something is."""
-    steps = app.steps
-    if app.worker.progress is not None:
-        return [Button("cancel", "Cancel what is running")]
+    steps, idle = app.steps, app.worker.progress is None
     if steps is None:
         return [Note("looking at the shot ...", "quiet")]
     if steps.problem:
-        return [Heading("To mend"), Note(steps.problem, "bad"), Button("check", "Look again")]
+        return [Heading("To mend"), Note(steps.problem, "bad"), Button("check", "Look again", idle)]
     if not steps.open:
         return []
+    if steps.open == ("result",):
+        return [
+            Note("The files in result/ are without the last edits; exporting brings them up to date too.", "quiet"),
+            Button("run:all", "Bring them up to date", idle),
+        ]
     words = advice(app)
     rows: list[Row] = [Heading("Next"), Note(words, "plain")]
     if not steps.done("register") and app.mode.name != "landmarks":
-        rows.append(Button("run:register", "Register"))
-    rows.append(Button("run:all", "Run all steps that are to do"))
+        rows.append(Button("run:register", "Register", idle))
+    rows.append(Button("run:all", "Run all steps that are to do", idle))
     return rows
 
 
@@ -88,9 +91,9 @@ def _view_rows(app: App) -> list[Row]:
             )
         )
     )
-    rows.append(Slider("light:azimuth", "light from", app.light.azimuth, -180, 180))
-    rows.append(Slider("light:elevation", "above", app.light.elevation, -89, 89))
-    rows.append(Slider("light:raking", "hardness", app.light.raking, 0, 1))
+    rows.append(Slider("light:azimuth", "light, degrees", app.light.azimuth, -180, 180, whole=True))
+    rows.append(Slider("light:elevation", "its height", app.light.elevation, -89, 89, whole=True))
+    rows.append(Slider("light:raking", "its hardness", app.light.raking, 0, 1))
     if app.data.has_bases:
         n_bases = app.data.weights.shape[1]
         options = tuple((str(k), f"basis {k + 1}") for k in range(n_bases))
@@ -116,7 +119,7 @@ def timeline_of(app: App) -> Timeline:
     """Frame, window, marks and the chosen basis's curves."""
     shown = app.editing.snapshot
     source = edited = None
-    title = ""
+    title = "no bases are chosen yet; their weights over the take will be here"
     if shown is not None:
         app.basis = min(app.basis, shown.weights.shape[1] - 1)
         source = shown.weights[:, app.basis]

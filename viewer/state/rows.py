@@ -67,6 +67,7 @@ class Slider:
     value: float
     low: float
     high: float
+    whole: bool = False
 
 
 @dataclass(frozen=True)
@@ -92,12 +93,13 @@ class Entry:
 
 @dataclass(frozen=True)
 class Items:
-    """A list; sends the index of the item that was clicked. ``chosen`` is -1 for none."""
+    """A list; sends the index of the item that was clicked. ``chosen`` is -1 for none, ``empty`` what to say then."""
 
     name: str
     items: tuple[str, ...]
     chosen: int = -1
     rows: int = 8
+    empty: str = ""
 
 
 Row = Heading | Note | Button | Buttons | Check | Choice | Slider | Number | Entry | Items

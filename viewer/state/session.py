@@ -103,6 +103,10 @@ class Editing:
 
         self._app.run_task("opening the shot for edits", work, done, failed=failed)
 
+    def drop_draft(self) -> None:
+        """Show the face without the open edit."""
+        self.call("showing the face", lambda session, _: session.drop_draft(), slot="draft", quiet=True, solves=False)
+
     def close(self) -> None:
         """Forget the session: the shot's stages were run again."""
         self.session, self.snapshot, self.problem = None, None, ""
@@ -191,10 +195,12 @@ class Editing:
         failed: Callable[[Exception], None] | None = None,
         quiet: bool = False,
         live: bool = False,
+        solves: bool = True,
     ) -> None:
         """Run ``work(session, progress)`` in the worker; show what the session says then, and call ``done(result)``.
 
-        ``live`` is for calls while a pointer moves: the marks on the time line are left as they were.
+        ``live`` is for calls while a pointer moves: the marks on the time line are left as they were. Of calls that
+        solve nothing (``solves``) the time is not told.
         """
         session = self.session
         if session is None:
@@ -214,7 +220,8 @@ class Editing:
                 return
             self._take(snapshot)
             self._keep((id(snapshot.shown), True, frame), shape)
-            self._app.solved(seconds)
+            if solves:
+                self._app.solved(seconds)
             done(result)
             self._app.touch("panel")
 

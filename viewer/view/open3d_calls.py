@@ -19,7 +19,9 @@ __all__ = [
     "DynamicMesh",
     "gui",
     "image_of",
+    "image_widget",
     "key_name",
+    "lowered",
     "modifiers_of",
     "new_scene",
     "quit_later",
@@ -123,6 +125,18 @@ def rectangle(place: Rectangle) -> Any:
 def image_of(pixels: NDArray[np.uint8]) -> Any:
     """A picture for an ImageWidget."""
     return o3d.geometry.Image(np.ascontiguousarray(pixels))
+
+
+def image_widget() -> Any:
+    """A widget for pictures; Open3D's own, without one, is a red box that tells of an error."""
+    return gui.ImageWidget(image_of(np.zeros((1, 1, 3), np.uint8)))
+
+
+def lowered(widget: Any, above: float, below: float = 0.0) -> Any:
+    """The widget with room above: layouts put all at the top of a row, where words stand higher than those in boxes."""
+    column = gui.Vert(0, gui.Margins(0, round(above), 0, round(below)))
+    column.add_child(widget)
+    return column
 
 
 def quit_later(app: Any, window: Any) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from viewer.state import rows as kinds
 from viewer.state.events import PanelInput
 from viewer.state.rows import Row
-from viewer.view.open3d_calls import gui
+from viewer.view.open3d_calls import gui, lowered
 
 __all__ = ["Panel"]
 
@@ -36,6 +36,8 @@ class Panel:
         self._em = window.theme.font_size
         self._send, self._letters = send, int(width * 1.92)
         self.widget = gui.ScrollableVert(0, gui.Margins(0.6 * self._em, 0.5 * self._em, 1.0 * self._em, 0.5 * self._em))
+        # Translucent: sliders and choices take the panel's colour, and would be nowhere to be seen in an opaque one.
+        self.widget.background_color = gui.Color(0.0, 0.0, 0.0, 0.22)
         self._proxy = gui.WidgetProxy()
         self.widget.add_child(self._proxy)
         self._shape: tuple[Any, ...] = ()
@@ -169,10 +171,10 @@ class Panel:
         return update
 
     def _slider(self, row: kinds.Slider, column: Any) -> Callable[[Any], None]:
-        widget = gui.Slider(gui.Slider.DOUBLE)
+        widget = gui.Slider(gui.Slider.INT if row.whole else gui.Slider.DOUBLE)
         # Also while it is moved: without a value it would be at its low end, and say so.
         widget.set_limits(_single(row.low), _single(row.high))
-        widget.double_value = _single(row.value)
+        widget.double_value = _held(row)
         widget.set_on_value_changed(lambda value: self._sent(row.name, float(value), False))
         self._line(column, row.text, widget)
         self.named[row.name] = widget
@@ -180,7 +182,7 @@ class Panel:
         def update(new: kinds.Slider) -> None:
             if new.name not in self._moving:  # never against the user's hand
                 widget.set_limits(_single(new.low), _single(new.high))
-                widget.double_value = _single(new.value)
+                widget.double_value = _held(new)
 
         return update
 
@@ -190,7 +192,7 @@ class Panel:
         if not row.whole:
             widget.decimal_precision = 5
         widget.set_on_value_changed(lambda value: self._sent(row.name, int(value) if row.whole else float(value)))
-        self._line(column, row.text, widget)
+        self._line(column, row.text, widget, lower=0.125)
         self.named[row.name] = widget
 
         def update(new: kinds.Number) -> None:
@@ -212,7 +214,7 @@ class Panel:
     def _items(self, row: kinds.Items, column: Any) -> Callable[[Any], None]:
         widget = gui.ListView()
         widget.set_max_visible_items(row.rows)
-        shown: list[str] = []
+        shown: list[str] | None = None
 
         def clicked(_: str, twice: bool) -> None:
             if not twice:
@@ -226,26 +228,36 @@ class Panel:
             nonlocal shown
             if shown != list(new.items):
                 shown = list(new.items)
-                widget.set_items(shown or ["(none)"])
+                widget.set_items(shown or [new.empty])
             widget.selected_index = new.chosen
 
         return update
 
-    def _line(self, column: Any, text: str, widget: Any) -> None:
-        """Labelled rows that follow each other share a grid, so that their widgets stand in one column."""
+    def _line(self, column: Any, text: str, widget: Any, lower: float = 0.0) -> None:
+        """Labelled rows that follow each other share a grid, so that their widgets stand in one column.
+
+        ``lower`` says by how much the widget is less high than others, in em.
+        """
         if self._grid is None:
-            self._grid = gui.VGrid(2, 0.25 * self._em)
+            self._grid = gui.VGrid(2, 0.06 * self._em)
             column.add_child(self._grid)
-        self._grid.add_child(gui.Label(text))
-        self._grid.add_child(widget)
+        # The two columns keep step only if their rows are equally high.
+        step = 0.19 * self._em
+        self._grid.add_child(lowered(gui.Label(text), step))
+        self._grid.add_child(lowered(widget, 0, step + lower * self._em))
 
     def _wrapped(self, text: str) -> str:
         return "\n".join(textwrap.fill(part, self._letters) for part in text.splitlines()) if text else " "
 
 
 def _single(value: float) -> float:
-    """A value that a slider can hold: it draws in single precision, and calls back where that changes the value."""
+    """What a slider's number becomes: it is drawn in single precision."""
     return float(np.float32(value))
+
+
+def _held(row: kinds.Slider) -> float:
+    """A value that the slider can hold: it calls back where drawing changes the value."""
+    return float(round(row.value)) if row.whole else _single(row.value)
 
 
 def _shape(row: Row) -> tuple[Any, ...]:

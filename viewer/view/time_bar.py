@@ -11,9 +11,11 @@ from viewer.state.app import App
 from viewer.state.events import Command, Event, TimelineInput
 from viewer.state.playhead import SPEEDS
 from viewer.view import open3d_calls as native
-from viewer.view.open3d_calls import gui, image_of
+from viewer.view.open3d_calls import gui, image_of, image_widget, lowered
 
 __all__ = ["TimeBar"]
+
+_DIGIT = 0.57  # width of one, in em
 
 
 class TimeBar:
@@ -40,18 +42,17 @@ class TimeBar:
         for speed in SPEEDS:
             self._speed.add_item(f"{speed:g}x")
         self._speed.set_on_selection_changed(lambda text, index: send(Command("speed", SPEEDS[index])))
-        self.buttons.add_child(self._speed)
-        self._words = gui.Label("frame 00000 of 00000   00:00.00    ")
-        self.buttons.add_child(self._words)
+        self.buttons.add_child(lowered(self._speed, 0.2 * em))
+        digits = len(str(app.play.n_frames))
+        self._words = self._label(8.0 + 2 * _DIGIT * digits)
         self.buttons.add_stretch()
-        self._window_words = gui.Label("window 00000 - 00000")
-        self.buttons.add_child(self._window_words)
+        self._window_words = self._label(4.4 + 2 * _DIGIT * digits)
         for text, which in (("[", "first"), ("]", "last"), ("All", "all")):
             button = gui.Button(text)
             button.horizontal_padding_em, button.vertical_padding_em = 0.5, 0.1
             button.set_on_clicked(lambda which=which: self._set_window(which))
             self.buttons.add_child(button)
-        self.picture = gui.ImageWidget()
+        self.picture = image_widget()
         self.picture.set_on_mouse(self._mouse)
         self._drawer = timeline.Drawer()
         self._size = (0, 0)
@@ -67,20 +68,26 @@ class TimeBar:
         app = self._app
         play = app.play
         seconds = play.seconds
-        self._words.text = (
-            f"frame {play.frame} of {play.n_frames}   {int(seconds // 60):02d}:{seconds % 60:05.2f}" + 8 * " "
-        )
+        self._words.text = f"frame {play.frame} of {play.n_frames}   {int(seconds // 60):02d}:{seconds % 60:05.2f}"
         self._play.text = "Pause" if play.playing else "Play"
         self._loop.is_on = play.loop
         self._speed.selected_index = SPEEDS.index(play.speed)
         window = play.window
-        self._window_words.text = (f"window {window[0]} - {window[1]}" if window else "window: all") + 8 * " "
+        self._window_words.text = f"window {window[0]} - {window[1]}" if window else "window: all"
         if self._size[0]:
             pixels = self._drawer.draw(self._layout(), app.timeline())
             self.picture.update_image(image_of(pixels))
 
     def _layout(self) -> timeline.Layout:
         return timeline.Layout(self._size[0], self._size[1], self._app.play.n_frames, self._scale)
+
+    def _label(self, width: float) -> Any:
+        """Words that change without a new layout, in a place of their own that is wide enough for all of them."""
+        label = gui.Label("")
+        place = lowered(label, 0.4 * self._em)
+        place.preferred_width = round(width * self._em)
+        self.buttons.add_child(place)
+        return label
 
     def _button(self, text: str, command: Command) -> Any:
         button = gui.Button(text)

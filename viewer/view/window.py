@@ -20,7 +20,7 @@ from viewer.state.app import App
 from viewer.state.events import Command, Event, Key
 from viewer.state.look import help_groups
 from viewer.view import open3d_calls as native
-from viewer.view.open3d_calls import gui, image_of
+from viewer.view.open3d_calls import gui, image_of, image_widget
 from viewer.view.pane import Pane
 from viewer.view.panel import Panel
 from viewer.view.state_file import write_state
@@ -67,15 +67,17 @@ class Window:
         self.times = TimeBar(self.window, app, self.stalls.timed("time line", self.send))
         self._titles = [gui.Label("") for _ in self.panes]
         # What no widget covers is never wiped.
-        self._floor = gui.Vert()
-        self._floor.background_color = gui.Color(0.175, 0.175, 0.18)
+        self._floor, self._back = _ground(0.175), _ground(0.285)
         self._status = gui.Label("")
         self._status.background_color = gui.Color(0.175, 0.175, 0.18)
         self._progress = gui.ProgressBar()
-        self._legend = gui.ImageWidget()
+        self._cancel = gui.Button("Cancel")
+        self._cancel.horizontal_padding_em, self._cancel.vertical_padding_em = 0.45, 0.0
+        self._cancel.set_on_clicked(lambda: self.send(Command("cancel")))
+        self._legend = image_widget()
         self._legend_of: Any = None
         self._places = arrange(Rectangle(0, 0, *size), self._em)
-        self._help = gui.ImageWidget()
+        self._help = image_widget()
         self._help_of: Any = None
         self._build()
         self._held: set[str] = set()
@@ -130,13 +132,14 @@ class Window:
         for pane in self.panes:
             pane.widget.set_on_mouse(self.stalls.timed("pointer", pane.mouse))
             self.window.add_child(pane.widget)
-        self._help.visible = self._legend.visible = self._progress.visible = False
+        for widget in (self._help, self._legend, self._progress, self._cancel):
+            widget.visible = False
         for label in self._titles:
             label.text_color = gui.Color(*_TITLE)
             label.background_color = gui.Color(0.0, 0.0, 0.0, 0.0)
         for widget in (
-            self.panel.widget, self.times.buttons, self.times.picture, *self._titles,
-            self._floor, self._status, self._progress, self._legend, self._help,
+            self._back, self.panel.widget, self.times.buttons, self.times.picture, *self._titles,
+            self._floor, self._status, self._progress, self._cancel, self._legend, self._help,
         ):  # fmt: skip
             self.window.add_child(widget)
         self.window.set_on_layout(self.stalls.timed("layout", self._layout))
@@ -152,8 +155,9 @@ class Window:
             label.frame = native.rectangle(title)
         self.times.place(places.buttons, places.times)
         for widget, place in (
-            (self.panel.widget, places.panel), (self._floor, places.floor), (self._status, places.status),
-            (self._progress, places.progress), (self._legend, places.legend),
+            (self._back, places.panel), (self.panel.widget, places.panel), (self._floor, places.floor),
+            (self._status, places.status), (self._progress, places.progress), (self._cancel, places.cancel),
+            (self._legend, places.legend),
         ):  # fmt: skip
             widget.frame = native.rectangle(place)
         self._settle, self._stale = 3, True
@@ -241,7 +245,7 @@ class Window:
         words, tone = self.app.status_line()
         self._status.text, self._status.text_color = words, gui.Color(*_TONES[tone])
         progress = self.app.worker.progress
-        self._progress.visible = progress is not None
+        self._progress.visible = self._cancel.visible = progress is not None
         if progress is not None:
             self._progress.value = progress[1] / progress[2] if progress[2] else 0.0
 
@@ -275,3 +279,10 @@ class Window:
         """Asked by the frame's button, and by Open3D before every Escape, as its key event tells after that."""
         self._asked_to_close = True
         return self._quitting
+
+
+def _ground(shade: float) -> Any:
+    """Something to put others on."""
+    made = gui.Vert()
+    made.background_color = gui.Color(shade, shade, shade + 0.005)
+    return made

@@ -123,7 +123,7 @@ def _export(desk: Any, shot: Path, data: ShotData) -> None:
     desk.button("format:gltf")
     desk.button("format:npy")
     desk.button("export now")
-    desk.wait(lambda state: "1 exported" in state["status"])
+    desk.wait(lambda state: "1 format exported" in state["status"])
     (path,) = (shot / "export").iterdir()
     np.testing.assert_allclose(np.load(path)[3], EditSession.open(Shot(shot)).frame(3), atol=1e-5)
 

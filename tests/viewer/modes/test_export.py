@@ -33,7 +33,7 @@ def test_what_is_chosen_is_written_with_the_edits(hand, shot: Shot) -> None:
         progress = app.worker.progress
         seen |= {progress[0]} if progress is not None else set()
         app.tick(0.01)
-    assert "1 exported" in app.message
+    assert "1 format exported" in app.message
     assert len(seen) > 1  # what it is about, as it goes on
     (path,) = shot.export_folder.iterdir()
     frames = np.load(path)
@@ -47,13 +47,15 @@ def test_an_export_can_be_cancelled_and_leaves_nothing(hand, shot: Shot) -> None
     app = hand.app
     app.choose_mode("export")
     app.handle(PanelInput("format:obj", True))
+    kinds = [type(row) for row in app.rows()]
     app.handle(PanelInput("export now"))
     app.take_changes()
     while app.worker.progress is None:
         app.tick(0.01)
     app.tick(0.01)
     assert "panel" in app.take_changes()
-    assert any(row.name == "cancel" for row in rows_of(app, Button))
+    assert not next(row for row in rows_of(app, Button) if row.name == "export now").enabled
+    assert [type(row) for row in app.rows()] == kinds  # nothing moves under the pointer
     app.handle(Command("cancel"))
     hand.wait()
     assert app.message == "the export is stopped"

@@ -206,7 +206,7 @@ def _time_rows(mode: DetailEditMode, draft: DetailDraft) -> list[Row]:
             rows.append(Button("rekey", f"Make frame {mode.app.play.frame} the key frame"))
         rows.append(Check("found", "find the window by the wrinkle", draft.window is None))
         if draft.window is None:
-            rows.append(Slider("threshold", "as long as it has, times", draft.threshold, 0.05, 0.9))
+            rows.append(Slider("threshold", "until it is down to, share", draft.threshold, 0.05, 0.9))
         else:
             rows.append(Note("drag the window's ends on the time line", "quiet"))
     rows.append(mode.settings_row())

@@ -30,6 +30,7 @@ _SPREADS = (
 _FARTHEST = 0.6  # of the face's height, on the slider
 _USUAL_BEYOND = 0.2
 _LIST_ROWS = 6
+_MET = 1e-4  # of the face's height: nobody sees what is left
 
 
 def hint(mode: PoseEdit) -> str:
@@ -46,7 +47,7 @@ def pose_rows(mode: PoseEdit) -> list[Row]:
     draft = mode.draft or PoseDraft()
     rows: list[Row] = [mode.tool_row(), *mode.commit_rows()]
     lines = tuple(_words(mode, index, handle) for index, handle in enumerate(draft.handles))
-    rows.append(Items("handle", lines, mode.selected, _LIST_ROWS))
+    rows.append(Items("handle", lines, mode.selected, _LIST_ROWS, "no points and no distances yet"))
     if 0 <= mode.selected < len(draft.handles):
         rows += _selected_rows(mode, draft.handles[mode.selected])
     rows += _held_rows(mode, draft)
@@ -111,7 +112,8 @@ def _selected_rows(mode: PoseEdit, chosen: Handle) -> list[Row]:
     rows: list[Row] = []
     if isinstance(chosen, PointConstraint):
         offset = _offset(mode, chosen)
-        rows += [Number(f"d{axis}", f"d{axis}", float(value)) for axis, value in zip("xyz", offset, strict=True)]
+        for axis, value in zip("xyz", offset, strict=True):
+            rows.append(Number(f"d{axis}", f"d{axis}, in the target's unit", float(value)))
     else:
         factor = chosen.factor
         if factor is None:
@@ -170,7 +172,7 @@ def _spread_rows(mode: PoseEdit, draft: PoseDraft) -> list[Row]:
 
 def _words(mode: PoseEdit, index: int, handle: Handle) -> str:
     residual = mode.residual(index)
-    left = "" if residual is None else f", {_short(residual.left)} left"
+    left = "" if residual is None else f", {_left(mode, residual.left)}"
     if isinstance(handle, PointConstraint):
         size = float(np.linalg.norm(_offset(mode, handle)))
         moved = f"moved {_short(size)}" if size > 0 else "stays"
@@ -182,7 +184,13 @@ def _words(mode: PoseEdit, index: int, handle: Handle) -> str:
 def _held_residual(mode: PoseEdit, draft: PoseDraft) -> str:
     index = len(draft.handles)
     residual = mode.residual(index)
-    return "" if residual is None else f"; they move by {_short(residual.left)}"
+    if residual is None:
+        return ""
+    return "; they hold" if residual.left < _MET * _height(mode) else f"; they move by {_short(residual.left)}"
+
+
+def _left(mode: PoseEdit, left: float) -> str:
+    return "met" if left < _MET * _height(mode) else f"{_short(left)} left"
 
 
 def _offset(mode: PoseEdit, point: PointConstraint) -> tuple[float, float, float]:

@@ -192,7 +192,7 @@ class OpenEdit(Mode, Generic[D]):
             return
         self.forget()
         if editing.snapshot is not None and (editing.snapshot.has_draft or self.app.worker.busy):
-            editing.call("showing the face", lambda session, _: session.drop_draft(), slot="draft", quiet=True)
+            editing.drop_draft()
 
     def undo(self) -> bool:
         """The last gesture of the open edit."""
