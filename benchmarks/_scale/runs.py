@@ -12,12 +12,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from benchmarks._scale.takes import LEVELS, performer_at
 from toolkit.feature_lines import FeatureLine, save_feature_lines
 from toolkit.mesh import TriangleMesh
-from toolkit.meshio import write_mesh
+from toolkit.meshio import cache_as_npy, open_sequence, write_mesh
 from toolkit.meshio.aside import folder_aside
 from toolkit.shot import Shot
 
@@ -103,14 +101,10 @@ def substitution_floor(shot: Path) -> float:
 
 
 def read_write_floor(shot: Path) -> float:
-    """Seconds to read the shot's take once and to write as many bytes; the copy is removed."""
+    """Seconds to read the shot's take once and to write as many bytes to the disk; the copy is removed."""
+    take, copy = open_sequence(Shot(shot).config.source.frames), shot / "copy.npy"
     began = time.perf_counter()
-    source, copy = np.load(Shot(shot).config.source.frames, mmap_mode="r"), shot / "copy.npy"
-    target = np.lib.format.open_memmap(copy, mode="w+", dtype=source.dtype, shape=source.shape)
-    size = max(1, 2**26 // source[:1].nbytes)
-    for start in range(0, len(source), size):
-        target[start : start + size] = source[start : start + size]
-    target.flush()
+    cache_as_npy(take, copy)
     seconds = time.perf_counter() - began
     copy.unlink()
     return seconds

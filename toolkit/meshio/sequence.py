@@ -91,7 +91,7 @@ def cache_as_npy(sequence: FrameSequence, path: str | Path, progress: Progress =
 
 def _read_through(sequence: FrameSequence, progress: Progress) -> Iterator[NDArray[np.float32]]:
     for start, stop in sequence.blocks():
-        yield sequence.read(start, stop)
+        yield sequence.view(start, stop)
         progress("reading frames", stop, sequence.n_frames)
 
 
