@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import sys
 import tempfile
 import time
@@ -203,6 +204,7 @@ def _table_2(work: Path, options: argparse.Namespace) -> list[dict[str, Any]]:
             f"{row.seconds / seconds:>8.1f}",
             flush=True,
         )
+        shutil.rmtree(work / f"row{number}", ignore_errors=True)  # up to 10 GiB
     return said
 
 
@@ -244,7 +246,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--share", type=float, default=1.0, help="share of Table 2's vertices and frames to run (1)")
     parser.add_argument("--no-section6", action="store_true", help="only Table 2")
-    parser.add_argument("--work", type=Path, help="where to put the shots; 6 GiB by default")
+    parser.add_argument("--work", type=Path, help="where to put the shots; 6 GiB, 16 for row 5")
     parser.add_argument("--takes", type=Path, metavar="DIR", help="keep the takes here, for the next time")
     parser.add_argument("--json", action="store_true", help="end with one line of JSON")
     return parser
