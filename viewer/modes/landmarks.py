@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.checks.picks import NEEDED_LANDMARKS
 from toolkit.registration.landmarks import Landmarks, load_landmarks, save_landmarks
 from viewer.modes.base import Mode
 from viewer.modes.undo import UndoStack
@@ -26,7 +27,6 @@ __all__ = ["LandmarkMode", "Pair"]
 
 _GRAB = 9.0  # pixels
 _ROUNDING = 1e-5  # of the face's height
-_LEAST = 3  # pairs that tell where a face is
 
 
 @dataclass(frozen=True)
@@ -105,10 +105,10 @@ class LandmarkMode(Mode):
         steps = self.app.steps
         if steps is not None and not steps.problem:
             label = "Register again" if self.app.data.has_registration else "Register"
-            enough = self.count >= _LEAST or steps.done("register")
+            enough = self.count >= NEEDED_LANDMARKS or steps.done("register")
             rows.append(Button("run:register", label, enough and self.app.worker.progress is None))
             if not enough:
-                rows.append(Note(f"to register, pick {_LEAST} pairs at least", "quiet"))
+                rows.append(Note(f"to register, pick {NEEDED_LANDMARKS} pairs at least", "quiet"))
         if self.app.data.has_registration:
             numbers = (self.app.shot.manifest("register") or {}).get("numbers", {})
             rows += _report(numbers)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.checks.picks import NEEDED_LANDMARKS
 from viewer.help_card import Group
 from viewer.state.fields import MAPS
 from viewer.state.panes import PAIRS
@@ -66,8 +67,8 @@ def advice(app: App) -> str:
     if steps.states["register"] != "done":
         count = getattr(app.modes.get("landmarks"), "count", 0)
         if steps.states["register"] == "missing":
-            if count < 6:
-                return f"Pick landmarks on both faces: {count} so far, 30 to 50 are good. Then register."
+            if count < NEEDED_LANDMARKS:
+                return f"Pick landmarks on both faces: {count} so far, 40 to 50 are best. Then register."
             return f"{count} landmarks are there. Register, and look at the distance."
         return "Landmarks, lines or files changed since the registration: register again."
     if steps.states["decompose"] == "missing":

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from toolkit.checks.picks import NEEDED_LANDMARKS
 from toolkit.feature_lines import FeatureLine, load_feature_lines
 from toolkit.mesh import TriangleMesh
 from toolkit.meshio import write_mesh
@@ -72,7 +73,7 @@ def test_a_raw_shot_begins_with_landmarks_and_says_what_to_do(user) -> None:
     assert app.pair.name == "references"
     notes = [row.text for row in app.rows() if isinstance(row, Note)]
     assert any(text.startswith("Pick landmarks on both faces: 0 so far") for text in notes)
-    assert any("3 pairs at least" in text for text in notes)
+    assert any(f"{NEEDED_LANDMARKS} pairs at least" in text for text in notes)
     (register,) = [row for row in app.rows() if isinstance(row, Button) and row.name == "run:register"]
     assert not register.enabled
     app.handle(Command("pair", "performance"))
