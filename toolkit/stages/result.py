@@ -70,10 +70,10 @@ def _open_blocks(shot_path: Path, written: Path) -> Fill:
 
 
 def _fill(shot: Shot, reconstruction: Reconstruction) -> Fill:
-    details = shot.array("decompose", "details")
-
     def fill(start: int, stop: int, frames: np.ndarray) -> None:
-        reconstruction.frames(start, stop, np.ascontiguousarray(details[start:stop]), frames)
+        # Mapped for this block alone: what was read through a map counts as the process's memory until it goes.
+        details = shot.array("decompose", "details")[start:stop]
+        reconstruction.frames(start, stop, np.ascontiguousarray(details), frames)
 
     return fill
 
