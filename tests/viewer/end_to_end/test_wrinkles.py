@@ -19,13 +19,13 @@ def edits(shot: Path) -> tuple:
 
 
 def wrinkle(shot: Path, data: ShotData) -> tuple[int, int]:
-    """A frame and a vertex between the root of the nose and the hair whose details are at their largest there."""
+    """A frame and a vertex on the lower half of the forehead whose details are at their largest there."""
     from toolkit.stages.inputs import load_landmark_pairs
 
     marks = load_landmark_pairs(Shot(shot))
     rest = data.registered
-    ends = rest[[int(marks.source[marks.names.index(name)]) for name in ("nasion", "forehead_mid")]]
-    near = np.linalg.norm(rest - ends.mean(axis=0), axis=1) < 0.5 * np.linalg.norm(ends[0] - ends[1])
+    low, high = rest[[int(marks.source[marks.names.index(name)]) for name in ("nasion", "forehead_high")]]
+    near = np.linalg.norm(rest - (0.75 * low + 0.25 * high), axis=1) < 0.25 * np.linalg.norm(high - low)
     ids = np.flatnonzero(near)
     details = Shot(shot).array("decompose", "details")
     size = np.linalg.norm(np.asarray(details[:, ids], dtype=np.float64), axis=2)
