@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.compiled import njit
+from toolkit.compiled import LOOPS, njit
 
 __all__ = ["flatness", "part_volumes", "squared_lengths"]
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.integer]
-_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def squared_lengths(points: Array, edges: Ids) -> Array:
     """Squared lengths (E,) of edges (E, 2) between points (V, 3)."""
     squared = np.empty(len(edges))
@@ -25,7 +24,7 @@ def squared_lengths(points: Array, edges: Ids) -> Array:
     return squared
 
 
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def flatness(vertices: Array, triangles: Ids) -> Array:
     """Least height (F,) of every triangle, in mesh units: twice its area over its longest side, 0 where that is 0."""
     heights = np.empty(len(triangles))
@@ -46,7 +45,7 @@ def flatness(vertices: Array, triangles: Ids) -> Array:
     return heights
 
 
-@njit(**_OPTIONS)
+@njit(**LOOPS)
 def part_volumes(vertices: Array, triangles: Ids, parts: Ids, middles: Array) -> tuple[Array, Array]:
     """Sums of ``a . (b x c) / 6`` and of areas over the triangles of every part, (parts,) each.
 
