@@ -52,7 +52,8 @@ class EdgeTable:
         """Label ``(V,)`` of the connected part of each vertex; a lone vertex is a part of its own."""
         starts = np.searchsorted(self.edges[:, 0], np.arange(self.n_vertices + 1))
         shape = (self.n_vertices, self.n_vertices)
-        graph = sp.csr_matrix((np.ones(len(self.edges), dtype=np.int8), self.edges[:, 1], starts), shape=shape)
+        ends = np.ascontiguousarray(self.edges[:, 1])  # some releases of SciPy take no other
+        graph = sp.csr_matrix((np.ones(len(self.edges), dtype=np.int8), ends, starts), shape=shape)
         labels: Ids = connected_components(graph, directed=False)[1]
         return labels
 
