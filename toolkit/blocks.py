@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 from collections.abc import Callable, Iterator
@@ -16,6 +17,7 @@ from toolkit.progress import Progress, silent
 __all__ = ["block_ranges", "block_size", "map_blocks", "scratch", "worker_count"]
 
 _BLOCK_BYTES = 256 * 2**20
+_CACHE_LINE = 64
 _KEPT = threading.local()
 
 
@@ -38,13 +40,21 @@ def worker_count() -> int:
 def scratch(name: str, shape: tuple[int, ...], dtype: DTypeLike = np.float32) -> NDArray:
     """An array with anything in it, which this thread gets again at the next call by that name, shape and type.
 
-    For what a block needs on the way only: new pages for every block take the system as long as a pass over them.
+    For what a block needs on the way only: new pages for every block take the system as long as a pass over them. It
+    begins on a cache line: vectors of numbers that lie across two lines take the processor a fifth longer.
     """
     kept = getattr(_KEPT, name, None)
     if kept is None or kept.shape != shape or kept.dtype != dtype:
-        kept = np.empty(shape, dtype)
+        kept = _on_a_cache_line(shape, np.dtype(dtype))
         setattr(_KEPT, name, kept)
     return kept
+
+
+def _on_a_cache_line(shape: tuple[int, ...], dtype: np.dtype) -> NDArray:
+    size = math.prod(shape) * dtype.itemsize
+    memory = np.empty(size + _CACHE_LINE, np.uint8)
+    first = -memory.ctypes.data % _CACHE_LINE
+    return memory[first : first + size].view(dtype).reshape(shape)
 
 
 def map_blocks(
