@@ -35,8 +35,10 @@ __all__ = [
 
 # Where the pass band ends, as a share of the eigenvalue that 40 steps of (0.5, -0.53) halve.
 _PASS_BAND_SHARE = (1 / 0.5 - 1 / 0.53) / 0.317
+# Share of what is smoothed that single precision may be off: of a face's motion, some nanometres.
+_SINGLE = 2e-6
 # Passes that go over a block together: of few, a block is read more often; what many need at once leaves the cache.
-_STEPS_TOGETHER = 7
+_STEPS_TOGETHER = 6
 
 
 @dataclass(frozen=True)
@@ -120,9 +122,8 @@ class SmoothingFilter:
         rows = np.repeat(np.arange(n_vertices), count)
         self._bandwidth = max(1, int(np.abs(rows - renumbered.indices).max(initial=0)))
         self.coefficients = filter_coefficients(parameters.steps, parameters.lambda_, parameters.mu, self._largest)
-        # Terms below what so many passes in single precision round away are passes for nothing.
         tail = np.cumsum(np.abs(self.coefficients[::-1]))[::-1]
-        self._coefficients32 = self.coefficients[: max(1, int(np.count_nonzero(tail > 3e-7)))]
+        self._coefficients32 = self.coefficients[: max(1, int(np.count_nonzero(tail > _SINGLE)))]
 
     def smooth(self, values: NDArray[np.floating]) -> NDArray[np.floating]:
         """``M values`` for an array ``(V, C)`` in the original numbering, in the precision that it has."""
