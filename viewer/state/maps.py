@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.state.coating import Coating
+from toolkit.rendering.fields import coating_fields
+from toolkit.shot import Shot
+from toolkit.smoothing import smoothing_filter
+from toolkit.stages.inputs import load_mesh
 from viewer.state.fields import Field, scaled
 from viewer.state.panes import Surface
 
@@ -27,7 +30,6 @@ class Maps:
 
     def __init__(self, app: App) -> None:
         self._app = app
-        self._coating = Coating(app.shot.config.smoothing)
         self._coating_of: Surface | None = None
         self._known: dict[str, tuple[tuple[Any, ...], Field]] = {}
 
@@ -76,9 +78,10 @@ class Maps:
         """Found in the worker; the last one is shown until then."""
         if self._coating_of is not surface and not self._app.play.playing:
             self._coating_of = surface
+            shot = self._app.shot
             self._app.run_task(
                 "measuring the coating",
-                lambda progress: self._coating.measure(surface.vertices, surface.triangles),
+                lambda progress: _coating(shot, surface),
                 lambda values: self._coating_found(surface, values),
                 slot="coating",
                 quiet=True,
@@ -93,3 +96,13 @@ class Maps:
             field = replace(field, scale=known[1].scale)  # one scale for the whole take, or nothing can be compared
         self._known["coating"] = ((surface,), field)
         self._app.touch("faces")
+
+
+def _coating(shot: Shot, surface: Surface) -> NDArray[np.floating]:
+    """``|L (S - S~)|`` of every vertex, ``(V,)``, in the target's unit, by the filter that the stages used.
+
+    That is the source's, also on the target: a wavelength is a length on the source.
+    """
+    parameters = shot.config.smoothing.resolved(load_mesh(shot, "source"))
+    smoothing = smoothing_filter(surface.triangles, len(surface.vertices), parameters)
+    return coating_fields(surface.vertices, surface.triangles, smoothing)[1]
