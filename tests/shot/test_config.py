@@ -47,11 +47,14 @@ def test_parameters_are_read_and_written(tmp_path: Path) -> None:
     [
         ("[bases]\ntreshold = 1\n", "did you mean 'threshold'"),
         ("[base]\n", "did you mean 'bases'"),
-        ('[bases]\ncount = "ten"\n', r"\[bases\] count = 'ten' should be a int"),
+        ('[bases]\ncount = "ten"\n', r"\[bases\] count = 'ten' should be a whole number"),
+        ("[bases]\nthreshold = nan\n", r"\[bases\] threshold = nan should be finite"),
+        ("[register]\nmax_distance = inf\n", "should be finite"),
+        ("[details]\nmethod = 3\n", "should be a word in quotes"),
         ("[bases]\ncount = 0\n", "count = 0"),
         ("[smoothing]\nmu = 0.3\n", r"mu = 0\.3"),
         ('[details]\nmethod = "magic"\n', "method is one of"),
-        ("[stabilise]\nenabled = 1\n", "should be a bool"),
+        ("[stabilise]\nenabled = 1\n", "should be true or false"),
         ('extras = "eyes.ply"\n', r"\[target\] extras = 'eyes.ply' should be a list of files"),
         ("extras = [1]\n", r"\[target\] extras = \[1\] should be a list of files"),
         ("bases = 3\n", "not TOML|should be a table"),
@@ -60,6 +63,12 @@ def test_parameters_are_read_and_written(tmp_path: Path) -> None:
 def test_mistakes_are_named(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         load_config(_written(tmp_path, text + MINIMAL if text.startswith("bases") else MINIMAL + text))
+
+
+def test_a_byte_order_mark_does_not_matter(tmp_path: Path) -> None:
+    path = _written(tmp_path, MINIMAL)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())  # as some editors on Windows begin their files
+    assert load_config(path).source.reference == tmp_path / "s.obj"
 
 
 def test_missing_inputs(tmp_path: Path) -> None:

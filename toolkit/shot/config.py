@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import sys
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
@@ -78,10 +79,13 @@ _STAGES: dict[str, type] = {
 }
 
 
+_KINDS = {int: "a whole number", float: "a number", str: "a word in quotes", bool: "true or false"}
+
+
 def load_config(path: Path) -> ShotConfig:
     """Read ``shot.toml``. Unknown or ill-typed keys are refused with the nearest known one."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise InputError(
             "there is no shot.toml", where=path.parent, remedy="make the shot with scripts/new_shot.py"
@@ -167,7 +171,9 @@ def _typed(value: Any, kind: type, what: str, path: Path) -> Any:
     if kind is list and not (isinstance(value, list) and all(isinstance(item, str) for item in value)):
         raise InputError(f"{what} = {value!r} should be a list of files", where=path, remedy='write ["eyes.ply"]')
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-        raise InputError(f"{what} = {value!r} should be a {kind.__name__}", where=path, remedy="mend the value")
+        raise InputError(f"{what} = {value!r} should be {_KINDS[kind]}", where=path, remedy="mend the value")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InputError(f"{what} = {value} should be finite", where=path, remedy="mend the value")
     return value
 
 
