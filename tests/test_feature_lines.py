@@ -141,3 +141,13 @@ def test_file_round_trip_and_bad_files(tmp_path: Path) -> None:
         path.write_text(json.dumps(content))
         with pytest.raises(InputError, match="no feature-line file"):
             load_feature_lines(path)
+
+
+@pytest.mark.parametrize("vertex", [1.5, "1", True, None, [1, 2], 10**30])
+def test_what_is_no_vertex_id_is_refused(tmp_path: Path, vertex: object) -> None:
+    path = tmp_path / "feature_lines.json"
+    for key in ("vertices", "target_vertices"):
+        line = {"name": "lip", "closed": False, "vertices": [1, 2], key: [0, vertex]}
+        path.write_text(json.dumps({"lines": [line]}), encoding="utf-8-sig")
+        with pytest.raises(InputError, match=r"of the line .lip. is .*, no vertex id"):
+            load_feature_lines(path)

@@ -21,6 +21,7 @@ from scipy.sparse.csgraph import dijkstra
 from toolkit.errors import InputError
 from toolkit.mesh import edge_graph, unique_edges
 from toolkit.meshio.aside import written_aside
+from toolkit.meshio.numbers import vertex_ids
 
 __all__ = [
     "EdgePaths",
@@ -201,7 +202,7 @@ def _split_at_corners(line: FeatureLine, vertices: NDArray[np.float64]) -> Openi
 def load_feature_lines(path: str | Path, n_source: int | None = None, n_target: int | None = None) -> list[FeatureLine]:
     """Read ``{"lines": [{"name", "closed", "vertices", "target_vertices"?, "guide"?}]}`` (0-based ids)."""
     try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
+        data = json.loads(Path(path).read_text(encoding="utf-8-sig"))
         entries = data["lines"]
         lines = [_line_from(entry) for entry in entries]
     except FileNotFoundError:
@@ -226,11 +227,11 @@ def _line_from(entry: dict[str, Any]) -> FeatureLine:
     for key, value in flags.items():
         if not isinstance(value, bool):
             raise ValueError(f"{key} of the line {entry['name']!r} is {value!r}, neither true nor false")
-    target = entry.get("target_vertices")
+    what, target = f"a vertex of the line {entry['name']!r}", entry.get("target_vertices")
     return FeatureLine(
         name=str(entry["name"]),
-        vertices=np.asarray(entry["vertices"], dtype=np.int64).reshape(-1),
-        target_vertices=None if target is None else np.asarray(target, dtype=np.int64).reshape(-1),
+        vertices=vertex_ids(entry["vertices"], what),
+        target_vertices=None if target is None else vertex_ids(target, what),
         **flags,
     )
 

@@ -35,6 +35,7 @@ def test_a_file_is_read_back(tmp_path: Path) -> None:
         ('{"pairs": [{"name": "a", "source": 1}]}', "pair 0: target"),
         ('{"pairs": [{"source": 1, "target": 2}, {"source": 1.5, "target": 2}]}', "pair 1: source is 1.5"),
         ('{"pairs": [{"source": true, "target": 2}]}', "True"),
+        ('{"pairs": [{"source": 1, "target": 1000000000000000000000}]}', "pair 0: target is 10+, no vertex id"),
         ('{"pairs": [7]}', "pair 0 is 7"),
     ],
 )
@@ -43,6 +44,12 @@ def test_a_bad_file_is_refused(tmp_path: Path, text: str, word: str) -> None:
     path.write_text(text)
     with pytest.raises(InputError, match=word):
         load_landmarks(path)
+
+
+def test_a_byte_order_mark_does_not_matter(tmp_path: Path) -> None:
+    path = tmp_path / "landmarks.json"
+    path.write_text('{"pairs": [{"name": "chin", "source": 3, "target": 4}]}', encoding="utf-8-sig")
+    assert load_landmarks(path).source.tolist() == [3]
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["parse_floats", "parse_integers"]
+__all__ = ["parse_floats", "parse_integers", "vertex_ids"]
 
 # What the Microsoft C runtime writes for not-a-number and infinity, e.g. 1.#QNAN, -1.#IND00, -nan(ind).
 _MICROSOFT_NAN = re.compile(rb"(?i)[^\s,]*(?:#(?:ind|qnan|snan)|nan\()\S*")
@@ -27,6 +29,16 @@ def parse_floats(text: bytes, expected: int) -> NDArray[np.float64] | None:
 def parse_integers(text: bytes, expected: int) -> NDArray[np.int64] | None:
     """Read ``expected`` whitespace-separated integers ``(expected,)``; None where that fails."""
     return _parse(text, np.int64, expected)
+
+
+def vertex_ids(values: Iterable[Any], what: str) -> NDArray[np.int64]:
+    """Vertex ids ``(n,)`` from a JSON file; ``what`` one of them is, for the ValueError where one is none."""
+    ids = list(values)
+    for value in ids:
+        # NumPy would cut 1.5 down to 1 and take true for 1.
+        if isinstance(value, bool) or not isinstance(value, int) or abs(value) > np.iinfo(np.int64).max:
+            raise ValueError(f"{what} is {value!r}, no vertex id")
+    return np.array(ids, dtype=np.int64)
 
 
 def _parse(text: bytes, dtype: type, expected: int) -> NDArray | None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from toolkit.errors import InputError
 from toolkit.meshio.aside import written_aside
+from toolkit.meshio.numbers import vertex_ids
 
 __all__ = ["Landmarks", "load_landmarks", "save_landmarks"]
 
@@ -57,7 +58,7 @@ def load_landmarks(path: str | Path) -> Landmarks:
     InputError : no such file, not of this form, or an id that is no whole number; with the file and the pair's index
     """
     try:
-        pairs = json.loads(Path(path).read_text(encoding="utf-8"))["pairs"]
+        pairs = json.loads(Path(path).read_text(encoding="utf-8-sig"))["pairs"]
         rows = [_pair(pair, index) for index, pair in enumerate(pairs)]
     except FileNotFoundError:
         raise InputError("there is no such file", where=path, remedy="give the path of a landmarks.json") from None
@@ -83,10 +84,5 @@ def save_landmarks(path: str | Path, landmarks: Landmarks) -> None:
 def _pair(pair: dict[str, object], index: int) -> tuple[str, int, int]:
     if not isinstance(pair, dict):
         raise TypeError(f"pair {index} is {pair!r}")
-    ids = []
-    for key in ("source", "target"):
-        value = pair.get(key)
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise TypeError(f"pair {index}: {key} is {value!r}, no vertex id")
-        ids.append(value)
-    return str(pair.get("name") or f"pair {index}"), ids[0], ids[1]
+    source, target = (int(vertex_ids([pair.get(key)], f"pair {index}: {key}")[0]) for key in ("source", "target"))
+    return str(pair.get("name") or f"pair {index}"), source, target
