@@ -81,6 +81,11 @@ class Shot:
         return self.path / "regions.json"
 
     @property
+    def drafts_path(self) -> Path:
+        """``drafts.json``, the viewer's edits that are not in the journal yet."""
+        return self.path / "drafts.json"
+
+    @property
     def frames_path(self) -> Path:
         """``result/frames.npy`` (T, V, 3) float32, in the target's unit and place."""
         return self.path / "result" / "frames.npy"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from toolkit.errors import InputError
 from toolkit.mesh import TriangleMesh
-from toolkit.meshio import FrameSequence, open_sequence, read_mesh
+from toolkit.meshio import FrameSequence, read_mesh
 from toolkit.rendering.extras import Extras, load_extras
 from toolkit.rendering.shots import reader_of
 from toolkit.rigid import Similarity
@@ -59,10 +59,7 @@ class ShotData:
     @cached_property
     def sequence(self) -> FrameSequence:
         """The take."""
-        cached = self.shot.stage_folder("inputs") / "frames.npy"
-        if cached.exists():
-            return load_sequence(self.shot)
-        return open_sequence(self.shot.config.source.frames, fps=self.shot.config.source.fps)
+        return load_sequence(self.shot)
 
     @property
     def n_frames(self) -> int:

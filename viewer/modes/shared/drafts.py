@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-from pathlib import Path
 from typing import Any
 
 from toolkit.meshio.aside import written_aside
@@ -19,7 +18,7 @@ class DraftFile:
     """``drafts.json`` of a shot: the open edit of each kind, as plain JSON values. Not part of the journal."""
 
     def __init__(self, shot: Shot) -> None:
-        self.path = Path(shot.path) / "drafts.json"
+        self.path = shot.drafts_path
 
     def read(self, kind: str) -> dict[str, Any] | None:
         """The open edit of a kind; None if there is none, or if the file cannot be read."""
