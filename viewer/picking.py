@@ -18,7 +18,7 @@ from viewer.raycast import first_hits, triangles_of_vertices
 from viewer.state.cameras import pixel_ray, pixel_size
 from viewer.state.events import Hit
 
-__all__ = ["Picker"]
+__all__ = ["Picker", "pixels_from_ray"]
 
 Array = NDArray[np.float64]
 
@@ -164,18 +164,13 @@ def _apart(points: NDArray[np.floating], camera: Camera, at: tuple[float, float]
     return np.asarray(np.hypot(flat[:, 0] - at[0], flat[:, 1] - at[1]))
 
 
-def ray_distance(origin: Array, direction: Array, points: NDArray[np.floating]) -> Array:
-    """Distance ``(n,)`` of ``points`` (n, 3) from a ray, in the mesh's unit."""
-    offset = np.asarray(points, dtype=np.float64) - origin
-    along = offset @ direction
-    return np.asarray(np.linalg.norm(offset - along[:, None] * direction, axis=1))
-
-
 def pixels_from_ray(
     origin: Array, direction: Array, points: NDArray[np.floating], camera: Camera, height: float
 ) -> Array:
     """How far ``points`` (n, 3) appear from the pointer, in pixels: ``(n,)``."""
-    return ray_distance(origin, direction, points) / pixel_size(camera, points, height)
+    offset = np.asarray(points, dtype=np.float64) - origin
+    apart = np.linalg.norm(offset - (offset @ direction)[:, None] * direction, axis=1)
+    return np.asarray(apart / pixel_size(camera, points, height))
 
 
 def _triple(vector: Array) -> tuple[float, float, float]:

@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw
 
 from toolkit.rendering.text import font, text_width
 
-__all__ = ["Drawer", "Layout", "Timeline", "at", "draw"]
+__all__ = ["Drawer", "Layout", "Timeline", "at"]
 
 _PAPER, _STRIP, _WINDOW = (24, 25, 28), (36, 38, 42), (62, 96, 140)
 _INK, _FAINT, _HEAD = (198, 201, 207), (92, 96, 103), (255, 206, 84)
@@ -107,11 +107,6 @@ def at(layout: Layout, window: tuple[int, int] | None, x: float, y: float) -> tu
     return ("window" if window[0] < frame < window[1] else "scrub"), frame
 
 
-def draw(layout: Layout, shown: Timeline) -> NDArray[np.uint8]:
-    """The picture ``(height, width, 3)`` uint8."""
-    return Drawer().draw(layout, shown)
-
-
 class Drawer:
     """Draws, and keeps what does not change while it plays: all but the playhead."""
 
@@ -143,7 +138,7 @@ def _draw_still(layout: Layout, shown: Timeline) -> Image.Image:
     image = Image.new("RGB", (layout.width, layout.height), _PAPER)
     pen = ImageDraw.Draw(image)
     _draw_strip(pen, layout, shown)
-    _draw_ruler(pen, layout, shown)
+    _draw_ruler(pen, layout)
     if layout.curves[1] - layout.curves[0] > 12 * layout.scale:
         _draw_curves(pen, layout, shown)
     return image
@@ -177,7 +172,7 @@ def _draw_strip(pen: ImageDraw.ImageDraw, layout: Layout, shown: Timeline) -> No
         pen.polygon([(x, middle - half), (x + half, middle), (x, middle + half), (x - half, middle)], fill=_INK)
 
 
-def _draw_ruler(pen: ImageDraw.ImageDraw, layout: Layout, shown: Timeline) -> None:
+def _draw_ruler(pen: ImageDraw.ImageDraw, layout: Layout) -> None:
     typeface = font(round(11 * layout.scale))
     top, bottom = layout.ruler
     step = _step(layout)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewer.timeline import Drawer, Layout, Timeline, at, draw
+from viewer.timeline import Drawer, Layout, Timeline, at
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
@@ -39,7 +39,7 @@ def test_the_playhead_stands_at_its_frame_and_marks_at_theirs() -> None:
     layout = Layout(600, 112, 100)
     marked = np.zeros(100)
     marked[70] = 1.0
-    image = draw(layout, Timeline(30, 30.0, None, marked)).astype(int)
+    image = Drawer().draw(layout, Timeline(30, 30.0, None, marked)).astype(int)
     assert image.shape == (112, 600, 3)
     column = image[60:, :].sum(axis=0)
     yellow = column[:, 0] + column[:, 1] - 2 * column[:, 2]
@@ -52,7 +52,7 @@ def test_curves_are_drawn_higher_where_weights_are_larger() -> None:
     layout = Layout(600, 112, 100)
     weights = np.zeros(100)
     weights[50] = 1.0
-    image = draw(layout, Timeline(0, 30.0, source=weights)).astype(int)
+    image = Drawer().draw(layout, Timeline(0, 30.0, source=weights)).astype(int)
     top = int(layout.curves[0])
     bright = (image[top:].min(axis=2) > 120).argmax(axis=0) + top
     assert bright[round(layout.x(50))] < bright[round(layout.x(30))] - 30
@@ -62,7 +62,7 @@ def test_a_gain_is_drawn_to_its_own_scale_with_words() -> None:
     layout = Layout(600, 112, 100)
     gain = np.linspace(0.0, 2.0, 100)
     shown = Timeline(0, 30.0, source=np.full(100, 9.0), gain=gain)
-    image = draw(layout, shown).astype(int)
+    image = Drawer().draw(layout, shown).astype(int)
     green = (image[:, :, 1] > image[:, :, 0] + 60) & (image[:, :, 1] > image[:, :, 2] + 60)
     rows = [np.flatnonzero(green[int(layout.curves[0]) :, round(layout.x(t))]) for t in (10, 40)]
     top, bottom = layout.curves
@@ -83,4 +83,4 @@ def test_what_is_kept_between_frames_changes_nothing() -> None:
         Timeline(61, 30.0, (5, 10), (), curve, 2 * curve, "one", (4,), curve),
         Timeline(61, 30.0, (5, 10), (), curve, 2 * curve, "one", (4,), 2 * curve),
     ):
-        np.testing.assert_array_equal(drawer.draw(layout, shown), draw(layout, shown))
+        np.testing.assert_array_equal(drawer.draw(layout, shown), Drawer().draw(layout, shown))

@@ -212,7 +212,7 @@ class PoseEdit(PoseSteps):
         draft = self.begun()
         dabs = self.brush.dabs(self.app, ground, last, event, "shift" in event.modifiers, picker)
         if dabs:
-            hard = [replace(dab, hardness=1.0, strength=1.0) for dab in dabs]
+            hard = [replace(dab, hardness=1.0) for dab in dabs]
             held = painted(ground.surface, hard, Region.whole(draft.fixed))
             self.draft = replace(draft, fixed=tuple(held.vertices.tolist()))
             self.app.touch("faces", "overlay")

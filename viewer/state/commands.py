@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Literal
 from toolkit.errors import InputError
 from toolkit.progress import Progress
 from viewer.stages_process import run_in_process
-from viewer.state.cameras import Viewpoint
 from viewer.state.events import Command, Key, PanelInput, TimelineInput
 from viewer.state.fields import MAPS
 from viewer.state.panes import PAIRS
@@ -19,7 +18,7 @@ from viewer.worker import Cancelled
 if TYPE_CHECKING:
     from viewer.state.app import App
 
-__all__ = ["key", "panel", "run", "timeline"]
+__all__ = ["key", "panel", "redo", "run", "timeline", "undo"]
 
 
 def key(app: App, event: Key) -> None:
@@ -258,5 +257,3 @@ _COMMANDS: dict[str, Callable[[Any, Any], None]] = {
     "check": _check,
     "quit": _quit,
 }
-
-__all__ += ["Viewpoint", "redo", "undo"]

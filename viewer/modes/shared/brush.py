@@ -26,11 +26,10 @@ _RING = 40
 
 @dataclass
 class Brush:
-    """``radius`` as a share of the face's height, ``hardness`` 0 soft to 1 hard, ``strength`` of one touch."""
+    """``radius`` as a share of the face's height, ``hardness`` 0 soft to 1 hard."""
 
     radius: float = 0.035
     hardness: float = 0.4
-    strength: float = 1.0
 
     def turned(self, notches: float) -> None:
         """Larger by notches of the wheel."""
@@ -42,7 +41,7 @@ class Brush:
         """The touches from the last event to this one, none where the pointer is beside the face."""
         radius = self.radius * app.surface(event.pane).framing.height / ground.scale
         return [
-            Dab(SurfacePoint(hit.triangle, hit.barycentric), radius, self.strength, self.hardness, erase)
+            Dab(SurfacePoint(hit.triangle, hit.barycentric), radius, hardness=self.hardness, erase=erase)
             for hit in stroke(picker, last, event, _STEP * self.radius * app.surface(event.pane).framing.height)
         ]
 

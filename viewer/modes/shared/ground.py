@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -34,22 +33,16 @@ class Grounds:
         self._app = app
         self.ground: Ground | None = None
         self._of: object = None
-        self._waiting: list[Callable[[], None]] = []
 
-    def refresh(self, ready: Callable[[], None] | None = None) -> None:
-        """The session was opened or closed: fetch the ground; ``ready()`` is called once it is there."""
+    def refresh(self) -> None:
+        """The session was opened or closed: fetch its ground."""
         session = self._app.editing.session
         if session is None:
             self.ground, self._of = None, None
             return
         if self._of is session:
-            if self.ground is not None and ready is not None:
-                ready()
-            elif ready is not None:
-                self._waiting.append(ready)
             return
         self._of, self.ground = session, None
-        self._waiting = [ready] if ready is not None else []
 
         def work(progress: Progress) -> Ground:
             take = session.detail_take
@@ -64,9 +57,6 @@ class Grounds:
         def done(ground: Ground) -> None:
             if self._of is session:
                 self.ground = ground
-                waiting, self._waiting = self._waiting, []
-                for call in waiting:
-                    call()
                 self._app.touch("panel", "overlay")
 
         self._app.run_task("preparing to paint", work, done, quiet=True)
