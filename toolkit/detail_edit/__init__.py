@@ -16,8 +16,6 @@ What the user commits goes to the journal as `to_data(edit)`, and comes back by 
 from toolkit.detail_edit.change import DetailChange
 from toolkit.detail_edit.curves import drawn, snapped
 from toolkit.detail_edit.data import (
-    curve_from_data,
-    curve_to_data,
     from_data,
     regions_from_data,
     regions_to_data,
@@ -47,8 +45,6 @@ __all__ = [
     "Surface",
     "SurfacePoint",
     "banded",
-    "curve_from_data",
-    "curve_to_data",
     "drawn",
     "find_window",
     "from_data",

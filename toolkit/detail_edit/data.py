@@ -13,7 +13,7 @@ from toolkit.detail_edit.region import Region
 from toolkit.detail_edit.surface import Curve, SurfacePoint
 from toolkit.errors import InputError
 
-__all__ = ["curve_from_data", "curve_to_data", "from_data", "regions_from_data", "regions_to_data", "to_data"]
+__all__ = ["from_data", "plain", "read_field", "regions_from_data", "regions_to_data", "to_data"]
 
 _KINDS: dict[str, type[Any]] = {"scale": ScaleEdit, "paste": PasteEdit, "reshape": ReshapeEdit, "gain": GainEdit}
 
@@ -25,7 +25,7 @@ def to_data(edit: DetailEdit) -> dict[str, Any]:
     for one in fields(edit):
         value = getattr(edit, one.name)
         if one.default is MISSING or value != one.default:
-            data[one.name] = _plain(value)
+            data[one.name] = plain(value)
     return data
 
 
@@ -42,14 +42,14 @@ def from_data(data: Mapping[str, Any], *, where: object = "") -> DetailEdit:
             continue
         if name not in known:
             raise InputError(f"{name!r} is unknown", where=where, remedy=f"known are {', '.join(sorted(known))}")
-        values[name] = _read(_read_field, name, value, where=where)
+        values[name] = read_field(name, value, where=where)
     edit: DetailEdit = _read(lambda: made(**values), where=where)
     return edit
 
 
 def regions_to_data(regions: Mapping[str, Region]) -> dict[str, Any]:
     """Named regions: ``{"regions": {name: {"vertices": [...], "weights": [...]}}}``."""
-    return {"regions": {name: _plain(region) for name, region in regions.items()}}
+    return {"regions": {name: plain(region) for name, region in regions.items()}}
 
 
 def regions_from_data(data: Mapping[str, Any], *, where: object = "") -> dict[str, Region]:
@@ -59,19 +59,8 @@ def regions_from_data(data: Mapping[str, Any], *, where: object = "") -> dict[st
     return {str(name): _read(_region, value, where=where) for name, value in data["regions"].items()}
 
 
-def curve_to_data(curve: Curve) -> dict[str, Any]:
-    """``{"triangles": [...], "weights": [[...], ...]}``."""
-    plain: dict[str, Any] = _plain(curve)
-    return plain
-
-
-def curve_from_data(data: Mapping[str, Any], *, where: object = "") -> Curve:
-    """The reverse."""
-    curve: Curve = _read(_curve, data, where=where)
-    return curve
-
-
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """A field's value as JSON values."""
     if isinstance(value, Region):
         data: dict[str, Any] = {"vertices": value.vertices.tolist()}
         return data if (value.weights == 1).all() else data | {"weights": value.weights.tolist()}
@@ -80,13 +69,18 @@ def _plain(value: Any) -> Any:
     if isinstance(value, SurfacePoint):
         return {"triangle": int(value.triangle), "weights": [float(weight) for weight in value.weights]}
     if isinstance(value, tuple):
-        return [_plain(one) for one in value]
+        return [plain(one) for one in value]
     if isinstance(value, np.generic):
         return value.item()
     return value
 
 
-def _read_field(name: str, value: Any) -> Any:
+def read_field(name: str, value: Any, *, where: object = "") -> Any:
+    """The reverse, of an edit's field ``name``; ``where`` names the file in messages."""
+    return _read(_field, name, value, where=where)
+
+
+def _field(name: str, value: Any) -> Any:
     if value is None or name not in _READERS:
         return value
     if name == "goal" and "triangles" in value:  # a curve where an edit reshapes, a point where it pastes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -15,13 +15,8 @@ from toolkit.detail_edit import (
     ReshapeEdit,
     ScaleEdit,
     SurfacePoint,
-    curve_from_data,
-    curve_to_data,
-    from_data,
-    regions_from_data,
-    regions_to_data,
-    to_data,
 )
+from toolkit.detail_edit.data import from_data, plain, read_field, to_data
 from toolkit.errors import InputError
 
 __all__ = ["ACTIONS", "DetailDraft"]
@@ -146,12 +141,12 @@ class DetailDraft:
 
     def to_data(self) -> dict[str, Any]:
         """Everything of it that is not as at the start."""
-        plain: dict[str, Any] = {"frame": self.frame}
+        data: dict[str, Any] = {"frame": self.frame}
         for one in fields(self):
             value = getattr(self, one.name)
             if value != one.default:
-                plain[one.name] = _plain(value)
-        return plain
+                data[one.name] = plain(value)
+        return data
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any], number: int | None = None) -> DetailDraft:
@@ -191,37 +186,10 @@ class DetailDraft:
         return other or self.source_shot is not None or self.rotation != 0 or self.scale != 1 or self.strength != 1
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, Region):
-        return regions_to_data({"": value})["regions"][""]
-    if isinstance(value, Curve):
-        return curve_to_data(value)
-    if isinstance(value, SurfacePoint):
-        return {"triangle": int(value.triangle), "weights": [float(weight) for weight in value.weights]}
-    return [_plain(one) for one in value] if isinstance(value, tuple) else value
-
-
-def _point(value: Mapping[str, Any]) -> SurfacePoint:
-    a, b, c = (float(weight) for weight in value["weights"])
-    return SurfacePoint(int(value["triangle"]), (a, b, c))
-
-
-def _region(value: Mapping[str, Any]) -> Region:
-    return regions_from_data({"regions": {"": value}})[""]
-
-
-_READERS: dict[str, Callable[[Any], Any]] = {
-    "region": _region,
-    "curve": curve_from_data,
-    "goal_curve": curve_from_data,
-    "start": _point,
-    "goal": _point,
-    "line": lambda points: tuple(_point(one) for one in points),
-    "goal_line": lambda points: tuple(_point(one) for one in points),
-    "window": lambda ends: (int(ends[0]), int(ends[1])),
-    "gains": lambda keys: tuple((int(frame), float(gain)) for frame, gain in keys),
-}
+# What an edit does not have, or calls by another name.
+_FIELDS = {"line": "start", "goal_line": "start", "goal_curve": "curve"}
 
 
 def _read(name: str, value: Any) -> Any:
-    return value if value is None or name not in _READERS else _READERS[name](value)
+    field = _FIELDS.get(name, name)
+    return tuple(read_field(field, one) for one in value) if name in ("line", "goal_line") else read_field(field, value)
