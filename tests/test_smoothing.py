@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from scipy.optimize import brentq
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -15,6 +16,7 @@ from toolkit.smoothing import (
     apply_steps,
     filter_coefficients,
     largest_eigenvalue,
+    level_bounds,
     parameters_for_wavelength,
     smooth_with_pymeshlab,
 )
@@ -61,24 +63,44 @@ def test_blocks_in_single_precision(bump: TriangleMesh, take: np.ndarray) -> Non
     assert np.abs(block - exact).max() < 1e-6 * np.abs(deltas).max()
 
 
-@pytest.mark.parametrize("columns", [1, 48])
-def test_passes_taken_together_are_the_same_passes(bump: TriangleMesh, columns: int) -> None:
-    """To the bit: a row that is read too early or too late would show."""
-    average = smoothing_average(bump.triangles, bump.n_vertices)
+@pytest.fixture
+def rows(bump: TriangleMesh) -> sp.csr_matrix:
+    """The averages of two bumps, which have borders, and of a vertex alone."""
+    n = bump.n_vertices
+    average = smoothing_average(np.concatenate([bump.triangles, bump.triangles + n]), 2 * n + 1)
     order = reverse_cuthill_mckee(average)
-    rows = average[order][:, order].tocoo()
-    bandwidth = int(np.abs(rows.row - rows.col).max())
-    csr = rows.tocsr()
-    share, own = (1 / np.diff(csr.indptr)).astype(np.float32), np.float32(0.3)
-    block = np.random.default_rng(2).normal(size=(bump.n_vertices, columns)).astype(np.float32)
+    return average[order][:, order].tocsr()
+
+
+@pytest.mark.parametrize("columns", [1, 21, 48])
+def test_passes_taken_together_are_the_same_passes(rows: sp.csr_matrix, columns: int) -> None:
+    """To the bit: a row that is read too early or too late would show."""
+    n = rows.shape[0]
+    share, own = (1 / np.diff(rows.indptr)).astype(np.float32), np.float32(0.3)
+    block = np.random.default_rng(2).normal(size=(n, columns)).astype(np.float32)
     coefficients = (0.8 ** np.arange(20)).astype(np.float32)
-    graph = csr.indptr.astype(np.uint32), csr.indices.astype(np.uint32), share, own, coefficients
+    graph = rows.indptr.astype(np.uint32), rows.indices.astype(np.uint32), share, own, coefficients
     together, one_by_one, spare = np.empty_like(block), np.empty_like(block), np.empty_like(block)
-    chebyshev_of_average(*graph, bump.n_vertices, 1, block, one_by_one, spare)
-    assert bump.n_vertices > 4 * bandwidth
+    chebyshev_of_average(*graph, np.array([0, n]), 1, block, one_by_one, spare)
+    bounds = level_bounds(rows)
+    assert len(bounds) > 40
     for depth in (2, 7, 19, 40):
-        chebyshev_of_average(*graph, bandwidth, depth, block, together, spare)
+        chebyshev_of_average(*graph, bounds, depth, block, together, spare)
         assert np.array_equal(together, one_by_one)
+
+
+def test_levels_have_to_do_with_those_beside_them_only(rows: sp.csr_matrix) -> None:
+    """Also where a vertex sees one of the border that does not see it: the middle of a fan."""
+    middle_sees_first = sp.lil_matrix(np.eye(7) + np.eye(7, k=1) + np.eye(7, k=-1))
+    middle_sees_first[5, 0] = 1
+    for graph in (rows, middle_sees_first.tocsr()):
+        bounds = level_bounds(graph)
+        assert bounds[0] == 0
+        assert bounds[-1] == graph.shape[0]
+        assert (np.diff(bounds) > 0).all()
+        pairs = graph.tocoo()
+        apart = np.searchsorted(bounds, pairs.row, "right") - np.searchsorted(bounds, pairs.col, "right")
+        assert np.abs(apart).max() == 1
 
 
 def test_the_eigenvalues_are_where_the_polynomial_is_fitted(bump: TriangleMesh) -> None:

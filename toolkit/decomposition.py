@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from toolkit.blocks import scratch
 from toolkit.frame_kernels import block_frames, longest_in_plane, opposite_edges, take_details
-from toolkit.kernels import block_to_frames, frames_to_block
+from toolkit.kernels import add_shape, block_to_frames, frames_to_block
 from toolkit.mesh.core import TriangleMesh
 from toolkit.mesh.topology import connected_components, vertex_adjacency
 from toolkit.meshio.sequence import FrameSequence
@@ -95,7 +95,7 @@ class Decomposer:
         turns, shifts = np.ascontiguousarray(rotations.T), np.einsum("bik,bi->kb", rotations, translations)
         frames_to_block(frames, self.filter.position, turns, shifts, self.mesh.vertices, delta)
         self.filter.smooth_block(delta, out=smooth)
-        np.add(smooth, self._smooth32[:, :, None], out=points)
+        add_shape(smooth, self._smooth32, points)
         take_details(points, *self.block.stencil, smooth, delta, self._offset32, self._detail32, details)
         return smooth, details
 

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from toolkit.blocks import FRAMES
 from toolkit.compiled import ARITHMETIC, LOOPS, njit
 
 __all__ = [
+    "add_shape",
     "block_to_frames",
     "chebyshev_of_average",
     "frames_to_block",
@@ -21,6 +23,8 @@ __all__ = [
 
 # Vertices that are copied frame by frame together, so that whole cache lines are written.
 _TILE = 64
+# Columns of a block, but for the last one of a take.
+_FULL = 3 * FRAMES
 
 
 @njit(**LOOPS)
@@ -83,6 +87,15 @@ def block_to_frames(block, position, out):
 
 
 @njit(**ARITHMETIC)
+def add_shape(block, shape, out):
+    """``out[v, :, b] = block[v, :, b] + shape[v]``, ``block`` and ``out`` (V, 3, B), ``shape`` (V, 3)."""
+    for v in range(len(block)):
+        for k in range(3):
+            for b in range(block.shape[2]):
+                out[v, k, b] = block[v, k, b] + shape[v, k]
+
+
+@njit(**ARITHMETIC)
 def place_block(points, shift, turns, starts, out):
     """Sum and move: ``out[v, :, b] = turns_b (points + shift)[v, :, b] + starts_b``.
 
@@ -110,11 +123,18 @@ def _first_rows(coefficient, first, last, block, current, previous):
 
 @njit(**ARITHMETIC)
 def _average_rows(starts, neighbours, share, own, coefficient, first, last, block, current, previous):
-    """Rows ``first <= i < last`` of ``previous <- coefficient block + own current - share A current - previous``.
+    """Rows ``first <= i < last`` of ``previous <- coefficient block + own current - share A current - previous``."""
+    # Told how many columns there are, the compiler does without most of the loops over them.
+    if block.shape[1] == _FULL:
+        _average_columns(starts, neighbours, share, own, coefficient, first, last, block, current, previous, _FULL)
+    else:
+        n = block.shape[1]
+        _average_columns(starts, neighbours, share, own, coefficient, first, last, block, current, previous, n)
 
-    Four neighbours at a time: what is written is then read again a quarter as often.
-    """
-    n_columns = block.shape[1]
+
+@njit(forceinline=True, **ARITHMETIC)
+def _average_columns(starts, neighbours, share, own, coefficient, first, last, block, current, previous, n_columns):
+    """Four neighbours at a time: what is written is then read again a quarter as often."""
     for i in range(first, last):
         p, stop, s = starts[i], starts[i + 1], share[i]
         if p + 4 <= stop:
@@ -139,25 +159,23 @@ def _average_rows(starts, neighbours, share, own, coefficient, first, last, bloc
 
 
 @njit(**ARITHMETIC)
-def chebyshev_of_average(starts, neighbours, share, own, coefficients, bandwidth, depth, block, out, spare):
+def chebyshev_of_average(starts, neighbours, share, own, coefficients, bounds, depth, block, out, spare):
     """``out <- sum_k c_k T_k(S) block`` (V, C) by Clenshaw's recurrence, ``S x = own x - share (sum over neighbours)``.
 
-    ``neighbours[starts[i]:starts[i + 1]]`` are row i's, none further than ``bandwidth`` rows away; ``share`` (V,).
-    ``b_k = c_k block + 2 S b_(k+1) - b_(k+2)``; ``out`` and ``spare`` do for all of them, as a row of ``b_(k+2)`` is
-    last needed where ``b_k`` takes its place. ``depth`` steps go over the rows together, each a chunk of ``bandwidth``
-    rows behind the step before it, so that a chunk is in the cache for all of them: memory is the bottleneck.
+    ``neighbours[starts[i]:starts[i + 1]]`` are row i's, ``share`` (V,). ``b_k = c_k block + 2 S b_(k+1) - b_(k+2)``;
+    ``out`` and ``spare`` do for all of them, as a row of ``b_(k+2)`` is last needed where ``b_k`` takes its place.
+    ``bounds`` cut the rows into chunks that have neighbours in the chunks beside them only. ``depth`` steps go over the
+    rows together, each a chunk behind the step before it, so that a chunk is in the cache for all of them: memory is
+    the bottleneck.
     """
-    n_rows = len(block)
-    degree = len(coefficients) - 1
+    degree, n_chunks = len(coefficients) - 1, len(bounds) - 1
     double = share + share
-    n_chunks = (n_rows + bandwidth - 1) // bandwidth
     done = 0
     while done <= degree:
         steps = min(depth, degree + 1 - done)
         for front in range(n_chunks + steps - 1):
             for step in range(max(0, front - n_chunks + 1), min(steps, front + 1)):
-                first = (front - step) * bandwidth
-                last = min(n_rows, first + bandwidth)
+                first, last = bounds[front - step], bounds[front - step + 1]
                 k = degree - done - step
                 # Not swapped but chosen, since the steps of a front alternate; the last one writes to ``out``.
                 read, write = (spare, out) if k % 2 == 0 else (out, spare)

@@ -37,8 +37,8 @@ __all__ = [
 _PASS_BAND_SHARE = (1 / 0.5 - 1 / 0.53) / 0.317
 # Share of what is smoothed that single precision may be off: of a face's motion, some nanometres.
 _SINGLE = 2e-6
-# Passes that go over a block together: of few, a block is read more often; what many need at once leaves the cache.
-_STEPS_TOGETHER = 6
+# What passes that go over a block together may need at once: more of it leaves the cache.
+_CACHE_BYTES = 6 * 2**20
 
 
 @dataclass(frozen=True)
@@ -119,8 +119,7 @@ class SmoothingFilter:
         half = self._largest / 2
         # S = (I - W) / half - I; W is a mean: the entries of a row are all alike.
         self._own, self._share = 1 / half - 1, 1 / (half * count)
-        rows = np.repeat(np.arange(n_vertices), count)
-        self._bandwidth = max(1, int(np.abs(rows - renumbered.indices).max(initial=0)))
+        self._bounds = level_bounds(renumbered)
         self.coefficients = filter_coefficients(parameters.steps, parameters.lambda_, parameters.mu, self._largest)
         tail = np.cumsum(np.abs(self.coefficients[::-1]))[::-1]
         self._coefficients32 = self.coefficients[: max(1, int(np.count_nonzero(tail > _SINGLE)))]
@@ -157,14 +156,16 @@ class SmoothingFilter:
         """The polynomial with these Chebyshev coefficients, of ``W``, applied to a block."""
         smooth = np.empty_like(block) if out is None else out
         flat = block.reshape(len(block), -1)
+        # Three arrays, of which a step needs about a chunk.
+        chunk_bytes = 3 * flat.nbytes / max(len(self._bounds) - 1, 1)
         chebyshev_of_average(
             self._starts,
             self._neighbours,
             self._share.astype(block.dtype),
             block.dtype.type(self._own),
             coefficients.astype(block.dtype),
-            self._bandwidth,
-            _STEPS_TOGETHER,
+            self._bounds,
+            max(1, int(_CACHE_BYTES / max(chunk_bytes, 1))),
             flat,
             smooth.reshape(flat.shape),
             scratch("smoothing", flat.shape, flat.dtype),
@@ -178,6 +179,24 @@ def smoothing_filter(
 ) -> SmoothingFilter:
     """The filter on this connectivity, kept: source and target share it."""
     return SmoothingFilter(triangles, n_vertices, parameters)
+
+
+def level_bounds(graph: sp.csr_matrix) -> NDArray[np.int64]:
+    """Bounds (N + 1,) between chunks of a graph's rows that have neighbours in the chunks beside them only.
+
+    In the order of a breadth-first search these are its levels.
+    """
+    n = graph.shape[0]
+    rows = np.repeat(np.arange(n), np.diff(graph.indptr))
+    # The last row that any row up to this one has to do with, whichever of the two sees the other: a border row is seen
+    # by rows inside that it does not see.
+    furthest = np.arange(n)
+    np.maximum.at(furthest, np.minimum(rows, graph.indices), np.maximum(rows, graph.indices))
+    furthest = np.maximum.accumulate(furthest)
+    bounds = [0, min(1, n)]
+    while bounds[-1] < n:
+        bounds.append(max(bounds[-1], int(furthest[bounds[-1] - 1])) + 1)
+    return np.array(bounds)
 
 
 def largest_eigenvalue(triangles: NDArray[np.integer]) -> float:
