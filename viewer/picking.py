@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.rendering import Camera
+from toolkit.rendering.camera import triple
 from viewer.raycast import first_hits, triangles_of_vertices
 from viewer.state.cameras import pixel_ray, pixel_size
 from viewer.state.events import Hit
@@ -119,7 +120,7 @@ class Picker:
         corners = self.vertices[ids].astype(np.float64)
         position = weights @ corners
         nearest = int(ids[np.argmin(np.linalg.norm(corners - position, axis=1))])
-        return Hit(triangle, _triple(weights), nearest, _triple(position))
+        return Hit(triangle, triple(weights), nearest, triple(position))
 
     def _near_miss(self, camera: Camera, x: float, y: float, size: tuple[int, int]) -> Hit | None:
         steps = np.arange(-_REACH, _REACH + 1)
@@ -171,8 +172,3 @@ def pixels_from_ray(
     offset = np.asarray(points, dtype=np.float64) - origin
     apart = np.linalg.norm(offset - (offset @ direction)[:, None] * direction, axis=1)
     return np.asarray(apart / pixel_size(camera, points, height))
-
-
-def _triple(vector: Array) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in vector)
-    return x, y, z

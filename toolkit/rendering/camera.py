@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from toolkit.errors import InputError
 
-__all__ = ["Camera"]
+__all__ = ["Camera", "triple"]
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Camera:
         points = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
         if len(points) == 0 or not np.isfinite(points).all():
             raise InputError(f"a camera cannot frame {len(points)} points that are not all finite")
-        probe = cls((0.0, 0.0, 0.0), _triple(-np.asarray(direction, dtype=np.float64)), _triple(up), fov)
+        probe = cls((0.0, 0.0, 0.0), triple(-np.asarray(direction, dtype=np.float64)), triple(up), fov)
         right, above, toward = probe.axes()
         flat = points @ np.stack([right, above, toward], axis=1)
         low, high = flat.min(axis=0), flat.max(axis=0)
@@ -57,14 +57,14 @@ class Camera:
         distance = float(np.max(reach + flat[:, 2] - middle[2]))
         centre = middle[0] * right + middle[1] * above + middle[2] * toward
         distance = max(distance, 1e-6 * (1 + float(np.abs(points).max())))
-        return cls(_triple(centre + distance * toward), _triple(centre), _triple(up), fov)
+        return cls(triple(centre + distance * toward), triple(centre), triple(up), fov)
 
     def orbited(self, azimuth: float = 0.0, elevation: float = 0.0) -> Camera:
         """Return the camera turned about its target, in degrees: to the picture's right, then upwards."""
         right, above, toward = self.axes()
         a, e = np.radians([azimuth, elevation])
         turned = np.cos(e) * (np.cos(a) * toward + np.sin(a) * right) + np.sin(e) * above
-        return replace(self, position=_triple(np.asarray(self.target) + self.distance * turned))
+        return replace(self, position=triple(np.asarray(self.target) + self.distance * turned))
 
     @property
     def distance(self) -> float:
@@ -95,7 +95,8 @@ class Camera:
         )
 
 
-def _triple(vector: ArrayLike) -> tuple[float, float, float]:
+def triple(vector: ArrayLike) -> tuple[float, float, float]:
+    """Three numbers as plain ones, for what is compared by value."""
     x, y, z = (float(c) for c in np.asarray(vector, dtype=np.float64))
     return x, y, z
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from toolkit.errors import InputError
 from toolkit.rendering import kernels
-from toolkit.rendering.camera import Camera
+from toolkit.rendering.camera import Camera, triple
 from toolkit.rendering.overlay import Lines, Markers, draw_overlays
 from toolkit.rendering.samples import Finish, KeyShadow, Surface, shade
 from toolkit.rendering.shading import CLAY, Lighting, Material, encode_pixels, linear_rgb
@@ -147,13 +147,13 @@ class Renderer:
         return KeyShadow(coords, depth, 0.004 * extent)
 
     def _finish(self, directions: Array, camera: Camera, lighting: Lighting, coloured: bool) -> Finish:
-        key, fill, rim = (_triple(direction) for direction in directions)
+        key, fill, rim = (triple(direction) for direction in directions)
         strengths = (lighting.key_strength, lighting.fill_strength, lighting.rim_strength)
         sharpness = float(self.material.sharpness)
         # A colour map must not glitter.
         gloss = (0.0 if coloured else float(self.material.gloss), sharpness, 0.003 ** (1 / sharpness))
-        wrap = _triple(self.material.wrap)
-        return Finish(key, fill, rim, _triple(strengths), _triple(camera.position), wrap, gloss)
+        wrap = triple(self.material.wrap)
+        return Finish(key, fill, rim, triple(strengths), triple(camera.position), wrap, gloss)
 
     def _sky(
         self, points: Array, normals: Array, in_view: NDArray[np.bool_], camera: Camera, lighting: Lighting
@@ -204,11 +204,6 @@ def _light_axes(light: Array) -> Array:
     right = np.cross(helper, light)
     right /= np.linalg.norm(right)
     return np.stack([right, np.cross(light, right), light])
-
-
-def _triple(vector: Sequence[float] | Array) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in vector)
-    return x, y, z
 
 
 def _sky_directions(count: int) -> Array:

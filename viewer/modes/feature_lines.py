@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from toolkit.feature_lines import EdgePaths, FeatureLine, load_feature_lines, save_feature_lines
 from toolkit.progress import Progress
+from toolkit.rendering.camera import triple
 from viewer.modes.base import Mode
 from viewer.modes.undo import UndoStack
 from viewer.state.events import Key, Pointer
@@ -111,7 +112,7 @@ class FeatureLineMode(Mode):
         if self._picks and self._side == side:
             if len(self._picks) > 1:
                 found.append(Curve(vertices[self._traced(side, self._picks, False)], ORANGE, 3.0))
-            found += [Disc(_place(vertices, v), ORANGE, 5.0, str(n)) for n, v in enumerate(self._picks, start=1)]
+            found += [Disc(triple(vertices[v]), ORANGE, 5.0, str(n)) for n, v in enumerate(self._picks, start=1)]
         return found
 
     def keys(self) -> Sequence[tuple[str, str]]:
@@ -332,8 +333,3 @@ def _in_words(line: FeatureLine) -> str:
     shape = ("closed" if line.closed else "open") + (", a guide" if line.guide else "")
     target = "" if line.target_vertices is None else ", on the target too"
     return f"{line.name}   {len(line.vertices)} vertices, {shape}{target}"
-
-
-def _place(vertices: NDArray[np.floating], vertex: int) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in vertices[vertex])
-    return x, y, z

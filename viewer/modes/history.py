@@ -14,6 +14,7 @@ from toolkit.editing.words import describe
 from toolkit.errors import InputError
 from toolkit.pose_edit import BeyondConstraint, DistanceConstraint, FixedConstraint, PointConstraint, Residual
 from toolkit.progress import Progress
+from toolkit.rendering.camera import triple
 from toolkit.shot.journal import Edit
 from viewer.modes.base import Mode, Tint
 from viewer.modes.detail.draft import DetailDraft
@@ -134,10 +135,10 @@ class History(Mode):
         marks: list[Mark] = []
         for edit, ids in self._taking_hold():
             color = YELLOW if edit.number == self.number else (BLUE if edit.on else GREY)
-            places = [tuple(float(x) for x in vertices[vertex]) for vertex in ids]
+            places = [triple(vertices[vertex]) for vertex in ids]
             if len(places) == 2 and edit.number == self.number:
                 marks.append(Curve(np.array(places), color, 1.6))
-            marks += [Disc(place, color, 5.0, str(edit.number)) for place in places]  # type: ignore[arg-type]
+            marks += [Disc(place, color, 5.0, str(edit.number)) for place in places]
         return marks
 
     def tint(self, pane: int) -> Tint | None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from toolkit.checks.picks import NEEDED_LANDMARKS
 from toolkit.registration.landmarks import Landmarks, load_landmarks, save_landmarks
+from toolkit.rendering.camera import triple
 from viewer.modes.base import Mode
 from viewer.modes.undo import UndoStack
 from viewer.picking import pixels_from_ray
@@ -122,7 +123,7 @@ class LandmarkMode(Mode):
             vertex = pair.on(surface.mesh)
             if vertex is not None and vertex < len(surface.vertices):
                 color = YELLOW if number - 1 == self.chosen else (BLUE if pair.whole else ORANGE)
-                found.append(Disc(_place(surface.vertices, vertex), color, 5.0, str(number)))
+                found.append(Disc(triple(surface.vertices[vertex]), color, 5.0, str(number)))
         return found
 
     def keys(self) -> Sequence[tuple[str, str]]:
@@ -277,11 +278,6 @@ def _with(pairs: tuple[Pair, ...], index: int, pair: Pair) -> tuple[Pair, ...]:
 
 def _id(vertex: int | None) -> str:
     return "?" if vertex is None else str(vertex)
-
-
-def _place(vertices: Any, vertex: int) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in vertices[vertex])
-    return x, y, z
 
 
 def _report(numbers: dict[str, Any]) -> list[Row]:

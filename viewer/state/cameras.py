@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from toolkit.rendering import Camera
+from toolkit.rendering.camera import Camera, triple
 from toolkit.rigid import Similarity
 
 __all__ = ["FIELD_OF_VIEW", "Framing", "Viewpoint", "pixel_ray", "pixel_size"]
@@ -37,13 +37,13 @@ class Framing:
         points = np.asarray(vertices, dtype=np.float64)
         low, high = points.min(axis=0), points.max(axis=0)
         height = max(float(high[1] - low[1]), 0.8 * float(high[0] - low[0]), 1e-9)
-        return cls(_triple((low + high) / 2), height)
+        return cls(triple((low + high) / 2), height)
 
     def moved(self, pose: Similarity) -> Framing:
         """The same framing on a face that lies elsewhere, is turned, and has another size."""
         axes = np.asarray(self.axes) @ pose.rotation.T
         centre = pose.apply(np.asarray(self.centre)[None])[0]
-        return Framing(_triple(centre), self.height * pose.scale, tuple(_triple(axis) for axis in axes))
+        return Framing(triple(centre), self.height * pose.scale, tuple(triple(axis) for axis in axes))
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Viewpoint:
         toward = self._toward() @ axes
         target = np.asarray(framing.centre) + framing.height * (np.asarray(self.shift) @ axes)
         position = target + self.distance * framing.height * toward
-        return Camera(_triple(position), _triple(target), _triple(axes[1]), FIELD_OF_VIEW)
+        return Camera(triple(position), triple(target), triple(axes[1]), FIELD_OF_VIEW)
 
     def orbited(self, right: float, up: float) -> Viewpoint:
         """Turned by a drag of that many pane heights."""
@@ -78,7 +78,7 @@ class Viewpoint:
         toward = self._toward()
         side = np.array([toward[2], 0.0, -toward[0]]) / max(float(np.hypot(toward[0], toward[2])), 1e-9)
         above = np.cross(toward, side)
-        return replace(self, shift=_triple(np.asarray(self.shift) - across * (right * side + up * above)))
+        return replace(self, shift=triple(np.asarray(self.shift) - across * (right * side + up * above)))
 
     def zoomed(self, notches: float, about: ArrayLike | None = None) -> Viewpoint:
         """Closer by some notches of the wheel; ``about`` (3,), as ``shift`` is, keeps its place in the picture."""
@@ -87,7 +87,7 @@ class Viewpoint:
         if about is None:
             return replace(self, distance=distance)
         kept, share = np.asarray(about, dtype=np.float64), distance / self.distance
-        return replace(self, distance=distance, shift=_triple(kept + share * (np.asarray(self.shift) - kept)))
+        return replace(self, distance=distance, shift=triple(kept + share * (np.asarray(self.shift) - kept)))
 
     def _toward(self) -> Array:
         a, e = np.radians([self.azimuth, self.elevation])
@@ -111,8 +111,3 @@ def pixel_size(camera: Camera, points: ArrayLike, height: float) -> Array:
     _, _, toward = camera.axes()
     depth = (np.asarray(camera.position) - np.asarray(points, dtype=np.float64)) @ toward
     return np.asarray(np.maximum(depth, 1e-12) * 2 * np.tan(np.radians(camera.fov) / 2) / height)
-
-
-def _triple(vector: ArrayLike) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in np.asarray(vector, dtype=np.float64))
-    return x, y, z

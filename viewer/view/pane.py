@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from toolkit.rendering.camera import triple
 from viewer import overlay, shading
 from viewer.layout import Rectangle
 from viewer.state.app import App
@@ -201,8 +202,8 @@ class Pane:
             self.index,
             self._pressed[0] if self._pressed else "none",
             native.modifiers_of(event),
-            _triple(origin),
-            _triple(direction),
+            triple(origin),
+            triple(direction),
             self.app.pick(self.index, x, y) if with_hit else None,
             moved if kind in ("drag", "release") else (0.0, 0.0),
             self._travel,
@@ -215,7 +216,3 @@ def _hidden(camera: Any) -> Any:
     """A place behind the camera, where unused triangles collapse."""
     position, target = np.asarray(camera.position), np.asarray(camera.target)
     return (position + (position - target)).astype(np.float32)
-
-
-def _triple(vector: Any) -> tuple[float, float, float]:
-    return float(vector[0]), float(vector[1]), float(vector[2])

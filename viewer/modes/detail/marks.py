@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolkit.detail_edit import Curve as SurfaceCurve
 from toolkit.detail_edit import SurfacePoint
+from toolkit.rendering.camera import triple
 from viewer.modes.base import Tint
 from viewer.modes.shared.pointing import surface_places
 from viewer.state.marks import BLUE, GREEN, ORANGE, WHITE, YELLOW, Color, Curve, Disc, Mark
@@ -61,8 +61,8 @@ def detail_marks(mode: DetailEditMode, pane: int) -> list[Mark]:
                 marks.append(Curve(ring.circle(draft.scale), GREEN, 1.8, closed=True))
                 knob = ring.knob(draft.rotation, draft.scale)
                 marks.append(Curve(np.stack([ring.middle, knob]), GREEN, 1.4))
-                marks.append(Disc(_triple(knob), WHITE, 6.0))
-                marks.append(Disc(_triple(ring.middle), GREEN, 5.0, "to"))
+                marks.append(Disc(triple(knob), WHITE, 6.0))
+                marks.append(Disc(triple(ring.middle), GREEN, 5.0, "to"))
     if len(mode.stroke_places) > 1:
         marks.append(Curve(np.array(mode.stroke_places), GREEN if mode.tool == "goal" else YELLOW, 2.5))
     if mode.tool == "paint" and mode.under is not None and mode.under[0] == pane:
@@ -83,9 +83,4 @@ def _line(
 
 
 def _place(mode: DetailEditMode, pane: int, point: SurfacePoint) -> tuple[float, float, float]:
-    return _triple(surface_places(mode.app, pane, [point.triangle], [point.weights])[0])
-
-
-def _triple(vector: NDArray[np.floating]) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in vector)
-    return x, y, z
+    return triple(surface_places(mode.app, pane, [point.triangle], [point.weights])[0])

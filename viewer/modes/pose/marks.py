@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.pose_edit import DistanceConstraint, PointConstraint
+from toolkit.rendering.camera import triple
 from viewer.modes.base import Tint
 from viewer.state.marks import BLUE, GREY, ORANGE, RED, WHITE, YELLOW, Curve, Disc, Mark, Text
 
@@ -37,7 +38,7 @@ def pose_marks(mode: PoseEdit, pane: int) -> list[Mark]:
             ends = surface.vertices[list(handle.vertices)].astype(np.float64)
             marks += _pair(handle, index, chosen, ends)
     if mode.pending is not None:
-        marks.append(Disc(_triple(surface.vertices[mode.pending]), BLUE, 6.0, "first"))
+        marks.append(Disc(triple(surface.vertices[mode.pending]), BLUE, 6.0, "first"))
     if mode.tool == "fix" and mode.under is not None and mode.under[0] == pane:
         marks.append(mode.brush.ring(mode.app, pane, mode.under[1]))
     return marks
@@ -64,11 +65,11 @@ def _point(mode: PoseEdit, point: PointConstraint, index: int, chosen: bool, now
     marks: list[Mark] = []
     if np.linalg.norm(goal - start) > 1e-3 * height:
         marks.append(Curve(np.stack([start, goal]), WHITE, 1.6))
-        marks.append(Disc(_triple(start), GREY, 2.6))
+        marks.append(Disc(triple(start), GREY, 2.6))
     if np.linalg.norm(goal - now) > _MISSED * height:
         marks.append(Curve(np.stack([now, goal]), RED, 2.2))
-        marks.append(Disc(_triple(now), RED, 3.0))
-    marks.append(Disc(_triple(goal), color, 6.5 if chosen else 5.0, str(index + 1)))
+        marks.append(Disc(triple(now), RED, 3.0))
+    marks.append(Disc(triple(goal), color, 6.5 if chosen else 5.0, str(index + 1)))
     return marks
 
 
@@ -77,11 +78,6 @@ def _pair(pair: DistanceConstraint, index: int, chosen: bool, ends: Array) -> li
     asked = f"x {pair.factor:.2f}" if pair.factor is not None else f"{pair.length:.4g}"
     return [
         Curve(ends, color, 2.6 if chosen else 1.8),
-        *(Disc(_triple(end), color, 4.0) for end in ends),
-        Text(_triple(ends.mean(axis=0)), f"{index + 1}: {asked}", color),
+        *(Disc(triple(end), color, 4.0) for end in ends),
+        Text(triple(ends.mean(axis=0)), f"{index + 1}: {asked}", color),
     ]
-
-
-def _triple(vector: NDArray[np.floating]) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in vector)
-    return x, y, z
