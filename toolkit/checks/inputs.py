@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.checks.findings import Finding, log_findings, raise_for
+from toolkit.checks.findings import Finding, Severity, log_findings, raise_for
 from toolkit.checks.mesh import check_mesh
 from toolkit.checks.picks import check_feature_lines, check_landmarks
-from toolkit.checks.repair import repair_source, repair_target
+from toolkit.checks.repair import Repair, repair_source, repair_target
 from toolkit.checks.scale import check_scale
+from toolkit.checks.seams import check_source_seams, join_seams
 from toolkit.checks.sequence import check_pair, check_sequence
 from toolkit.feature_lines import FeatureLine
 from toolkit.mesh import TriangleMesh
@@ -83,15 +84,20 @@ def check_inputs(
         log_findings(finding for finding in findings if finding.repair is None or finding.severity == "info")
         said.extend(findings)
 
-    judge(check_mesh(source, places.source) + check_mesh(target, places.target))
+    judge(_not_to_be_welded(check_mesh(source, places.source)) + check_mesh(target, places.target))
     judge(check_pair(source, sequence, places.source))
+    judge(check_source_seams(source, sequence, places.source))
     judge(check_landmarks(names, source_ids, target_ids, source, target, places.landmarks))
     judge(check_feature_lines(lines, source, places.feature_lines))
-    judge(check_feature_lines(on_target, target, f"{places.feature_lines} (target)"))
+    joined = Repair(target, np.arange(target.n_vertices), ())
+    if not np.array_equal(source.triangles, target.triangles):  # else its vertices are to stay as the source's
+        joined = join_seams(target, [line for line in on_target if not line.guide], places.target)
+    on_joined = [replace(line, vertices=_followed(line.vertices, joined.vertex_map)) for line in on_target]
+    judge(check_feature_lines(on_joined, joined.mesh, f"{places.feature_lines} (target)"))
     judge(_idle_guides(lines, places))
     judge(check_scale(source.vertices[np.asarray(source_ids)], target.vertices[np.asarray(target_ids)], places.target))
-    good_source, good_target = repair_source(source, places.source), repair_target(target, places.target)
-    moved = good_target.vertex_map
+    good_source, good_target = repair_source(source, places.source), repair_target(joined.mesh, places.target)
+    moved = good_target.vertex_map[joined.vertex_map]
     judge(_lost_picks(names, target_ids, on_target, moved, places))
     judge(check_sequence(sequence, source, progress=progress))
     return CheckedInputs(
@@ -104,8 +110,23 @@ def check_inputs(
         ),
         moved,
         tuple(said),
-        good_source.notes + good_target.notes,
+        good_source.notes + joined.notes + good_target.notes,
     )
+
+
+def _not_to_be_welded(findings: list[Finding]) -> list[Finding]:
+    """A source's vertices are the take's: what only other ones could mend is refused, or said and left."""
+    unmended: dict[str | None, Severity] = {"weld": "error", "split edges": "warning"}
+    return [
+        replace(finding, severity=unmended[finding.repair], repair=None) if finding.repair in unmended else finding
+        for finding in findings
+    ]
+
+
+def _followed(ids: Ids, vertex_map: Ids) -> Ids:
+    """Where ids ``(n,)`` went; what is no vertex stays what it is, for the check that says so."""
+    inside = (ids >= 0) & (ids < len(vertex_map))
+    return np.where(inside, vertex_map[np.where(inside, ids, 0)], ids)
 
 
 def _idle_guides(lines: Sequence[FeatureLine], places: Places) -> list[Finding]:

@@ -14,7 +14,7 @@ from toolkit.checks.mesh import duplicate_faces, flat_faces, is_soup, repeated_c
 from toolkit.checks.winding import coherent_flips, is_inside_out
 from toolkit.mesh import Polygons, TriangleMesh
 
-__all__ = ["Repair", "repair_source", "repair_target"]
+__all__ = ["Repair", "repair_source", "repair_target", "said"]
 
 logger = logging.getLogger(__name__)
 
@@ -46,7 +46,7 @@ def repair_source(mesh: TriangleMesh, where: object = "") -> Repair:
     if bad.any():
         notes.append(f"left out {_faces(bad)} without area or there twice")
         mesh = replace(mesh, triangles=np.ascontiguousarray(mesh.triangles[~bad]))
-    return _said(Repair(mesh, np.arange(mesh.n_vertices), tuple(notes)), where)
+    return said(Repair(mesh, np.arange(mesh.n_vertices), tuple(notes)), where)
 
 
 def repair_target(mesh: TriangleMesh, where: object = "") -> Repair:
@@ -70,7 +70,7 @@ def repair_target(mesh: TriangleMesh, where: object = "") -> Repair:
         notes += [f"removed {loose} vertices that belong to no face"] if loose else []
     changed = TriangleMesh(vertices, triangles) if notes else mesh
     sound = np.ones(changed.n_triangles, dtype=bool)
-    return _said(Repair(_turned(changed, sound, notes), vertex_map, tuple(notes)), where)
+    return said(Repair(_turned(changed, sound, notes), vertex_map, tuple(notes)), where)
 
 
 def _clean_faces(mesh: TriangleMesh, notes: list[str]) -> NDArray[np.int32]:
@@ -182,7 +182,8 @@ def _faces(mask: NDArray[np.bool_]) -> str:
     return f"{count} face{'s' if count > 1 else ''}"
 
 
-def _said(repair: Repair, where: object) -> Repair:
+def said(repair: Repair, where: object) -> Repair:
+    """The same, with its notes in the log."""
     for note in repair.notes:
         logger.warning("%s%s", f"{where}: " if str(where) else "", note)
     return repair

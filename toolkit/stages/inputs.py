@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from toolkit.checks import (
 )
 from toolkit.checks.edges import edge_table
 from toolkit.checks.inputs import Places
+from toolkit.checks.seams import check_source_seams
 from toolkit.feature_lines import FeatureLine, load_feature_lines, save_feature_lines, trace_lines
 from toolkit.mesh import Polygons, TriangleMesh
 from toolkit.meshio import FrameSequence, cache_as_npy, open_sequence, read_mesh
@@ -112,6 +114,7 @@ def _check_without_landmarks(
     for findings in (
         check_mesh(source, places.source) + check_mesh(target, places.target),
         check_pair(source, sequence, places.source),
+        [replace(finding, severity="warning") for finding in check_source_seams(source, sequence, places.source)],
         check_feature_lines(lines, source, places.feature_lines),
         check_sequence(sequence, source, progress=progress),
     ):
