@@ -42,12 +42,6 @@ def test_names_are_escaped_and_every_curve_is_in_the_legend():
     assert all(t in texts for t in ("a<b", "c&d", "x < y"))
 
 
-def test_marks_stand_at_their_value():
-    root = _parse(line_chart({"y": [0, 1, 2, 3]}, marks=[1]))
-    mark = next(line for line in root.iter("line") if line.get("class") == "mark")
-    assert float(mark.get("x1")) == pytest.approx(_points(root)[0][1, 0], abs=0.11)
-
-
 def test_heat_chart_embeds_one_pixel_per_value():
     import base64
     import io

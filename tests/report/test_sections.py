@@ -77,8 +77,8 @@ def test_all_sections_make_one_page(count):
                 sections.decomposition_section([], {}),
                 sections.bases_section([], weights, 1 / np.arange(1, count + 2), "cm", {}),
                 sections.transfer_section([], {"lips": {"source": np.zeros(30), "result": np.ones(30)}}, {}),
-                sections.details_section(np.ones(30), None, "cm", {}),
-                sections.timings_section({"register": 1.25, "bases": 2.5}, {}),
+                sections.details_section(np.ones(30), np.ones(30), "cm", {}),
+                sections.timings_section({"register": 1.25, "bases": 2.5}),
             ],
         )
     )

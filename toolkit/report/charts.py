@@ -20,30 +20,19 @@ _COLORS = ("#4c8dd6", "#e0803a", "#45a566", "#c4558f", "#8d78d8", "#b09a2c", "#4
 def line_chart(
     curves: Mapping[str, ArrayLike],
     *,
-    x: ArrayLike | None = None,
     x_label: str = "frame",
     y_label: str = "",
-    marks: Sequence[float] = (),
-    zero: bool = True,
 ) -> str:
     """Draw curves over a shared axis as an SVG element.
 
-    Parameters
-    ----------
-    curves : name to values (N,); what is not finite leaves a gap
-    x : (N,) positions, 0, 1, 2, ... where not given
-    marks : positions of vertical dashes, e.g. a chosen K
-    zero : let the vertical axis begin at zero where all values are positive
+    ``curves`` has values (N,) at 0, 1, 2, ... by name; what is not finite leaves a gap. The vertical axis holds zero.
     """
     values = {name: np.asarray(v, dtype=np.float64).ravel() for name, v in curves.items()}
     longest = max((len(v) for v in values.values()), default=0)
-    at = np.arange(longest, dtype=np.float64) if x is None else np.asarray(x, dtype=np.float64)
+    at = np.arange(longest, dtype=np.float64)
     x_range = _limits(at)
-    y_range = _limits(np.concatenate([*values.values(), [0.0] if zero else []]))
+    y_range = _limits(np.concatenate([*values.values(), [0.0]]))
     parts = [_axes(x_range, y_range, x_label, y_label)]
-    for mark in marks:
-        px = _x(mark, x_range)
-        parts.append(f'<line class="mark" x1="{px:.1f}" x2="{px:.1f}" y1="{_TOP}" y2="{_HEIGHT - _BOTTOM}"/>')
     for k, series in enumerate(values.values()):
         for path in _paths(_x(at[: len(series)], x_range), _y(series, y_range)):
             color = _COLORS[k % len(_COLORS)]
@@ -51,14 +40,14 @@ def line_chart(
     return _svg(parts, _legend(list(values)) if len(values) > 1 else "")
 
 
-def heat_chart(rows: ArrayLike, *, x_label: str = "frame", y_label: str = "", cmap: str = "magma") -> str:
+def heat_chart(rows: ArrayLike, *, y_label: str = "") -> str:
     """Draw ``rows`` (K, N) as a heat map, a row a band, as an SVG element. For many curves at once."""
     from PIL import Image as PilImage
 
     from toolkit.rendering.colormap import ColorScale
 
     field = np.asarray(rows, dtype=np.float64)
-    scale = ColorScale.unsigned(field, percentile=99.5, cmap=cmap)
+    scale = ColorScale.unsigned(field, percentile=99.5, cmap="magma")
     buffer = io.BytesIO()
     PilImage.fromarray(scale.colors(field)).save(buffer, "PNG")
     data = base64.b64encode(buffer.getvalue()).decode("ascii")
@@ -67,7 +56,7 @@ def heat_chart(rows: ArrayLike, *, x_label: str = "frame", y_label: str = "", cm
         f'<image x="{_LEFT}" y="{_TOP}" width="{plot_width}" height="{plot_height}" preserveAspectRatio="none" '
         f'style="image-rendering:pixelated" href="data:image/png;base64,{data}"/>'
     )
-    axes = _axes((0.0, max(field.shape[1] - 1.0, 1.0)), (float(len(field)), 0.0), x_label, y_label)
+    axes = _axes((0.0, max(field.shape[1] - 1.0, 1.0)), (float(len(field)), 0.0), "frame", y_label)
     return _svg([axes, picture], f'<span class="key">0 – {scale.high:.3g}, dark to bright</span>')
 
 

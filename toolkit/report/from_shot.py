@@ -157,7 +157,7 @@ def _details(shot: Shot) -> Section:
 
 def _timings(shot: Shot) -> Section:
     manifests = {name: shot.manifest(name) for name in STAGES}
-    return sections.timings_section({name: float(m["seconds"]) for name, m in manifests.items() if m}, {})
+    return sections.timings_section({name: float(m["seconds"]) for name, m in manifests.items() if m})
 
 
 def _numbers(shot: Shot, stage: str) -> Mapping[str, Any]:

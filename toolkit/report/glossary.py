@@ -24,14 +24,14 @@ class Entry:
 
 GLOSSARY: tuple[Entry, ...] = (
     Entry(
-        r"flip",
+        r"flipped",
         "Triangles turned inside out by the registration. They show as dark specks; none is best.",
         good=0.002,
         poor=0.01,
         share=True,
     ),
     Entry(
-        r"wrong_(sheet|lip|lid)",
+        r"wrong_sheet",
         "Vertices that landed on the other lip or lid. They tear when the mouth or the eyes open: add "
         "landmarks or feature lines there.",
         good=0.002,
@@ -39,7 +39,7 @@ GLOSSARY: tuple[Entry, ...] = (
         share=True,
     ),
     Entry(
-        r"landmark.*(share|relative)",
+        r"landmark.*share",
         "How far landmarks ended from their partners, as a share of the face's height. One large value is "
         "usually one misplaced landmark.",
         good=0.01,
@@ -47,20 +47,15 @@ GLOSSARY: tuple[Entry, ...] = (
         share=True,
     ),
     Entry(
-        r"landmark.*(error|mean|max|rms|median|worst|distance)",
-        "How far landmarks ended from their partners. One large value is usually one misplaced landmark.",
+        r"landmark_worst$",
+        "The landmark that ended farthest from its partner.",
     ),
     Entry(
-        r"distance.*(share|relative)|(share|relative).*distance",
+        r"distance.*share",
         "Distance of the fitted face from the target's surface, as a share of the face's height.",
         good=0.002,
         poor=0.01,
         share=True,
-    ),
-    Entry(
-        r"distance",
-        "Distance of the fitted face from the target's surface. Small everywhere but at parts that the "
-        "target lacks is right; patches of colour on the skin are not.",
     ),
     Entry(
         r"gap",
@@ -85,10 +80,6 @@ GLOSSARY: tuple[Entry, ...] = (
         "How unlike the two faces are: what is left between the landmarks after moving, turning and scaling.",
     ),
     Entry(
-        r"crossing",
-        "Triangles that run through each other, mostly at lips or lids. Watch these frames in the video.",
-    ),
-    Entry(
         r"jitter",
         "Trembling from frame to frame beside the source's, scaled by how much each face moves: 1 is as much as the "
         "performer has. The worst parts are usually calm ones near a quick motion.",
@@ -102,37 +93,25 @@ GLOSSARY: tuple[Entry, ...] = (
         share=True,
     ),
     Entry(
-        r"residual|error_rms",
+        r"error_rms",
         "What the bases leave out of the source's large motion. If an expression looks weak, ask for more "
         "bases or a lower threshold.",
     ),
     Entry(
-        r"^n?_?bases$",
+        r"^bases$",
         "How many frames serve as bases. Ten to thirty is usual for a take.",
     ),
     Entry(
-        r"wrinkle|detail.*energy",
-        "Strength of the fine detail. The result's curve should rise and fall with the source's.",
-    ),
-    Entry(
-        r"coating",
-        "Size of the fine detail that the smoothing took off: pores, wrinkles and creases.",
-    ),
-    Entry(
-        r"strength|wavelength",
-        "What counts as detail: shorter features travel as wrinkles, longer ones as shape.",
+        r"smoothing_steps",
+        "How far the smoothing reaches: shorter features travel as wrinkles, longer ones as shape.",
     ),
     Entry(
         r"gain",
         "Factor on the transferred wrinkles; below one for smooth faces, such as a child's.",
     ),
     Entry(
-        r"scale",
+        r"size_ratio",
         "Size of the target's face relative to the source's; motion is scaled by it.",
-    ),
-    Entry(
-        r"peak.*gb|memory",
-        "Most memory in use at a time.",
     ),
 )
 

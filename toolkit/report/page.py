@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from toolkit.report.data import ReportData
 from toolkit.report.numbers import number_rows
 
-__all__ = ["build", "data_uri"]
+__all__ = ["build"]
 
 
 def build(data: ReportData) -> str:
@@ -26,16 +26,16 @@ def build(data: ReportData) -> str:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters.update(data_uri=data_uri, rows=number_rows, anchor=_anchor)
+    environment.filters.update(data_uri=_data_uri, rows=number_rows, anchor=_anchor)
     return environment.get_template("report.html").render(report=data)
 
 
-def data_uri(image: NDArray[np.uint8], quality: int = 90) -> str:
+def _data_uri(image: NDArray[np.uint8]) -> str:
     """Embed a picture (h, w, 3) uint8 as JPEG: a tenth of a PNG, and renders hide what that costs."""
     from PIL import Image as PilImage
 
     buffer = io.BytesIO()
-    PilImage.fromarray(np.ascontiguousarray(image)).save(buffer, "JPEG", quality=quality, subsampling=0, optimize=True)
+    PilImage.fromarray(np.ascontiguousarray(image)).save(buffer, "JPEG", quality=90, subsampling=0, optimize=True)
     return "data:image/jpeg;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
 
 

@@ -61,11 +61,9 @@ def registration_figures(
     return figures
 
 
-def coating_figures(
-    view: View, frame: int, smoothing: SmoothingFilter, unit: str, *, only: Ids | None = None
-) -> list[Figure]:
+def coating_figures(view: View, frame: int, smoothing: SmoothingFilter, unit: str) -> list[Figure]:
     """One frame, its smoothed shape and the coating between them, as in the paper's Figure 2."""
-    camera = view.camera(_SIZE[0] / _SIZE[1], only=only)
+    camera = view.camera(_SIZE[0] / _SIZE[1])
     points = np.asarray(view.frame(frame), dtype=np.float64)
     smooth, length, along = coating_fields(points, view.triangles, smoothing)
     renderer = Renderer(view.triangles, view.material)
@@ -84,9 +82,7 @@ def coating_figures(
     ]
 
 
-def motion_figures(
-    views: Sequence[View], frame: int, heights: Sequence[float], *, only: Ids | None = None
-) -> list[Figure]:
+def motion_figures(views: Sequence[View], frame: int, heights: Sequence[float]) -> list[Figure]:
     """How far every vertex moved in one frame, head motion apart, in percent of the face's height, on one scale."""
     fields = [
         100 * motion_field(np.asarray(view.rest, dtype=np.float64), view.frame(frame)) / height
@@ -95,21 +91,21 @@ def motion_figures(
     scale = ColorScale.unsigned(np.stack(fields), "motion", "% of the face's height")
     figures = []
     for view, field in zip(views, fields, strict=True):
-        camera = view.camera(_SIZE[0] / _SIZE[1], only=only)
+        camera = view.camera(_SIZE[0] / _SIZE[1])
         image = Renderer(view.triangles).render(view.frame(frame), camera, _SIZE, colors=scale.colors(field))
         figures.append(Figure(add_legend(image, scale), f"{view.label}: motion in frame {frame}."))
     return figures
 
 
 def bases_figures(
-    shapes: Sequence[tuple[View, Array]], frames: Ids, *, only: Ids | None = None, width: int = 240, limit: int = 21
+    shapes: Sequence[tuple[View, Array]], frames: Ids, *, width: int = 240, limit: int = 21
 ) -> list[Figure]:
     """Thumbnails of the first ``limit`` bases: each picture has one face a view, source above target.
 
     ``shapes`` pairs a view with its bases (K, V, 3); ``frames`` (K,) are their frame numbers.
     """
     size = (width, round(width * 1.25))
-    cameras: list[Camera] = [view.camera(size[0] / size[1], only=only) for view, _ in shapes]
+    cameras: list[Camera] = [view.camera(size[0] / size[1]) for view, _ in shapes]
     renderers = [Renderer(view.triangles, view.material) for view, _ in shapes]
     figures = []
     for k, frame in enumerate(np.asarray(frames)[:limit]):

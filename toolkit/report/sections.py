@@ -51,7 +51,7 @@ def decomposition_section(figures: Sequence[Figure], numbers: Numbers) -> Sectio
     return Section(
         "Shape and detail",
         "Every frame is split into a smooth large-scale shape and a coating of fine detail. Wrinkles should be in the "
-        "coating and not in the smooth shape; if they are in both, raise the strength of the smoothing.",
+        "coating and not in the smooth shape; if they are in both, give the smoothing a longer wavelength.",
         figures,
         numbers=numbers,
     )
@@ -104,11 +104,9 @@ def transfer_section(
     )
 
 
-def details_section(source_energy: ArrayLike, result_energy: ArrayLike | None, unit: str, numbers: Numbers) -> Section:
+def details_section(source_energy: ArrayLike, result_energy: ArrayLike, unit: str, numbers: Numbers) -> Section:
     """Strength of the motion detail in every frame (T,), source and result."""
-    curves: dict[str, ArrayLike] = {"source": source_energy}
-    if result_energy is not None:
-        curves["result"] = result_energy
+    curves = {"source": source_energy, "result": result_energy}
     caption = "Strength of the moving wrinkles (RMS over the face); both curves should rise and fall together."
     return Section(
         "Wrinkles",
@@ -118,9 +116,9 @@ def details_section(source_energy: ArrayLike, result_energy: ArrayLike | None, u
     )
 
 
-def timings_section(seconds: Mapping[str, float], numbers: Numbers) -> Section:
+def timings_section(seconds: Mapping[str, float]) -> Section:
     """Wall-clock seconds of each stage."""
     rows: dict[str, Any] = {f"{name} (s)": round(value, 2) for name, value in seconds.items()}
     if len(seconds) > 1:
         rows["total (s)"] = round(sum(seconds.values()), 2)
-    return Section("Timings", "Time of each stage when it last ran.", numbers={**rows, **numbers})
+    return Section("Timings", "Time of each stage when it last ran.", numbers=rows)
