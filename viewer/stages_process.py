@@ -123,16 +123,11 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _export(shot: Shot, formats: Sequence[str], progress: Progress) -> list[Any]:
-    from toolkit.export import FORMATS, export
+    from toolkit.export import export, file_name
     from toolkit.stages.performance import load_performance
 
     performance = load_performance(shot)
-    reports = []
-    for name in formats:
-        suffixes = FORMATS[name].suffixes
-        file_name = performance.name + suffixes[0] if suffixes else f"{performance.name}_{name}"
-        reports.append(export(performance, shot.export_folder / file_name, name, progress))
-    return reports
+    return [export(performance, shot.export_folder / file_name(performance, name), name, progress) for name in formats]
 
 
 def _say(words: dict[str, Any]) -> None:

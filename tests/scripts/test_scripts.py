@@ -77,11 +77,15 @@ def test_from_files_to_exports(bump: TriangleMesh, inputs: dict[str, Path], tmp_
     assert frames.shape == (20, bump.n_vertices, 3)
     assert frames.dtype == np.float32
     assert np.array_equal(np.load(shot / "result" / "triangles.npy"), bump.triangles)
-    done = script("7_export", shot, "--format", "pc2", "--format", "gltf", "--format", "obj", "--json")
+    done = script(
+        "7_export", shot, "--format", "pc2", "--format", "gltf", "--format", "obj", "--metres-per-unit", "0.1", "--json"
+    )
     assert done.returncode == 0, done.stderr
     paths = [Path(export["path"]) for export in json.loads(done.stdout.splitlines()[-1])["exports"]]
     assert np.array_equal(open_sequence(paths[0]).read(0, 20), frames)
     assert open_sequence(paths[1]).n_frames == 20
+    rest = np.load(shot / "stages" / "register" / "target_vertices.npy")
+    assert np.allclose(read_mesh(paths[1]).vertices, 0.1 * rest, atol=1e-6)
     assert np.array_equal(open_sequence(paths[2]).read(3, 4)[0], frames[3])
 
 

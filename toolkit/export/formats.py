@@ -12,7 +12,7 @@ from toolkit.export.performance import Performance
 from toolkit.meshio.leftovers import remove_leftovers
 from toolkit.progress import Progress, silent
 
-__all__ = ["FORMATS", "ExportReport", "Format", "export"]
+__all__ = ["FORMATS", "ExportReport", "Format", "export", "file_name"]
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,12 @@ class ExportReport:
     n_bytes: int
     rms_deviation: float = 0.0
     max_deviation: float = 0.0
+
+
+def file_name(performance: Performance, format: str) -> str:
+    """What a performance is called in a format, where nobody gives a path."""
+    suffixes = FORMATS[format].suffixes
+    return performance.name + suffixes[0] if suffixes else f"{performance.name}_{format}"
 
 
 def export(performance: Performance, path: str | Path, format: str, progress: Progress = silent) -> ExportReport:

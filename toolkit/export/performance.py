@@ -32,7 +32,7 @@ class Performance:
     fps : frames a second
     name : of the object in the files
     morph_names : K names of the bases; by default basis_00, basis_01, ...
-    metres_per_unit : for USD and glTF, where the user has said it
+    metres_per_unit : of the target's unit, for USD and glTF, where the user has said it
 
     Raises
     ------
