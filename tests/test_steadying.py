@@ -29,7 +29,8 @@ def test_the_weights_equal_a_direct_solve(take):
     matrix = np.concatenate([np.kron(np.eye(len(frames)), bases.T), np.kron(bend, bases.T)])
     direct = nnls(matrix, np.concatenate([frames.ravel(), (bend @ frames).ravel()]))[0].reshape(found.shape)
     assert found.min() >= 0
-    np.testing.assert_allclose(found, direct, atol=1e-4)
+    assert np.array_equal(found == 0, direct == 0)
+    np.testing.assert_allclose(found, direct, atol=1e-9)
 
 
 def test_what_is_left_out_becomes_calmer_at_little_cost(take):
@@ -49,6 +50,54 @@ def test_a_take_that_the_bases_reach_keeps_its_weights():
     np.testing.assert_allclose(found, weights, atol=1e-9)
 
 
+def left_to_gain(inner: np.ndarray, coupling: np.ndarray, strength: float, weights: np.ndarray) -> float:
+    """How far the weights are from the optimality conditions, in units of each basis' size, beside the largest."""
+    bend = np.diff(np.eye(len(weights)), n=2, axis=0)
+    size = np.sqrt(np.diag(inner))
+    slope = (np.eye(len(weights)) + strength * bend.T @ bend) @ (weights @ inner - coupling) / size
+    return float(np.abs(np.minimum(weights * size, slope)).max() / (weights * size).max())
+
+
+@pytest.mark.parametrize("strength", [0.3, 4.0, 100.0])
+@pytest.mark.parametrize("apart", [1.0, 1e-2, 1e-3])
+def test_bases_that_are_nearly_alike_give_the_optimum_all_the_same(apart: float, strength: float) -> None:
+    rng = np.random.default_rng(5)
+    t = np.arange(120)[:, None]
+    frames = np.maximum(np.sin(rng.uniform(0.05, 0.3, 9) * t + rng.uniform(0, 6, 9)), 0) @ rng.normal(size=(9, 60))
+    bases = frames[[10, 40, 70, 70, 100]] * [[1], [1], [1], [1 - apart], [1e-3]] + apart * rng.normal(size=(5, 60))
+    inner, coupling = bases @ bases.T, frames @ bases.T
+    weights = steady_weights(inner, coupling, one_by_one(frames, bases), strength)
+    assert (weights == 0).any()
+    assert left_to_gain(inner, coupling, strength, weights) < 1e-10
+
+
+def test_a_basis_that_is_there_twice_changes_nothing(take):
+    frames, bases = take
+    twice = np.concatenate([bases, bases[:1], np.zeros((1, bases.shape[1]))])
+    found = steady_weights(twice @ twice.T, frames @ twice.T, one_by_one(frames, twice), 2.0)
+    alone = steady_weights(bases @ bases.T, frames @ bases.T, one_by_one(frames, bases), 2.0)
+    assert found.min() >= 0
+    np.testing.assert_allclose(found @ twice, alone @ bases, atol=1e-6)
+
+
+@pytest.mark.parametrize("n_frames", [3, 4])
+def test_the_shortest_takes(n_frames: int) -> None:
+    frames, bases = np.array([[0.0], [1.0], [-1.0], [0.5]])[:n_frames], np.ones((1, 1))
+    found = steady_weights(bases @ bases.T, frames @ bases.T, np.maximum(frames, 0), 2.0)
+    assert (found == 0).any()
+    assert (found > 0).any()
+    assert left_to_gain(bases @ bases.T, frames @ bases.T, 2.0, found) < 1e-12
+
+
+def test_what_leaves_nothing_to_choose_stays_as_it_is(take):
+    frames, bases = take
+    alone = one_by_one(frames, bases)
+    inner, coupling = bases @ bases.T, frames @ bases.T
+    assert np.array_equal(steady_weights(inner, coupling, alone, 2.0, np.full(len(frames), True)), alone)
+    assert np.array_equal(steady_weights(inner, coupling, alone, 0.0), alone)
+    assert np.array_equal(steady_weights(inner, coupling[:2], alone[:2], 2.0), alone[:2])
+
+
 def test_frames_at_rest_stay_at_rest(take):
     frames, bases = take[0].copy(), take[1]
     frames[:4] = 0
@@ -57,6 +106,11 @@ def test_frames_at_rest_stay_at_rest(take):
     steady = steady_weights(bases @ bases.T, frames @ bases.T, alone, 1.0, held)
     assert not steady[:4].any()
     assert np.abs(steady - alone).max() > 1e-3
+    # The same with the held frames' terms written out.
+    bend = np.diff(np.eye(len(frames)), n=2, axis=0)
+    time = np.eye(len(frames)) + bend.T @ bend
+    slope = (time @ (steady @ bases - frames) @ bases.T)[4:]
+    assert np.abs(np.minimum(steady[4:], slope)).max() < 1e-9
     still = frames.reshape(40, 30, 3)
     assert not select_bases(gram_matrix(still), 30, BasisParameters(threshold=0, count=3)).weights[:4].any()
 

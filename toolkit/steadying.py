@@ -12,57 +12,65 @@ It does not smooth the motion itself, only what the bases leave out; where nothi
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
+
+from toolkit.banded import FrameBands
+from toolkit.bounded import LinearSystem, minimise
 
 __all__ = ["steady_weights"]
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
-_MOST_STEPS = 2000
-_TOLERANCE = 1e-7
+# The least that any mixture of bases of unit size must cost for its share in the weights to be told by the frames.
+_DEFINITE = 1e-9
 
 
-def steady_weights(
-    inner: Array, coupling: Array, start: Array, strength: float, held: NDArray[np.bool_] | None = None
-) -> Array:
+def steady_weights(inner: Array, coupling: Array, start: Array, strength: float, held: Bools | None = None) -> Array:
     """Minimise the above from ``start`` (T, K), the weights fitted frame by frame; ``(T, K)``, non-negative.
 
     ``inner`` (K, K) = B B^T, ``coupling`` (T, K) = X B^T, frames in their order in time; ``strength`` s, in frames^4;
-    frames that are ``held`` (T,) keep the weights they have: at rest, all must stay at rest.
-    Nesterov's projected gradient steps, restarted where they would climb (O'Donoghue and Candes 2015).
+    frames that are ``held`` (T,) keep the weights they have: at rest, all must stay at rest. Where bases nearly repeat
+    each other, what the frames do not tell stays near the start.
     """
-    if strength == 0 or len(start) < 3 or start.shape[1] == 0:
+    free = np.full(len(start), True) if held is None else ~held
+    if strength == 0 or len(start) < 3 or start[free].size == 0:
         return start
-    scale = np.sqrt(np.maximum(np.diag(inner), 1e-300))
-    # In units of each basis' own size, so that one step serves weak and strong ones.
-    scaled, right = inner / np.outer(scale, scale), coupling / scale
-    # The largest eigenvalue of D2^T D2 is below 16.
-    step = 1 / ((1 + 16 * strength) * float(np.linalg.eigvalsh(scaled)[-1]))
-    weights = start * scale
-    ahead, momentum = weights, 1.0
-    enough = _TOLERANCE * max(float(weights.max()), 1e-300)
-    for _ in range(_MOST_STEPS):
-        gradient = _coupled(ahead @ scaled - right, strength)
-        if held is not None:
-            gradient[held] = 0
-        moved = np.maximum(ahead - step * gradient, 0)
-        change = moved - weights
-        if np.abs(change).max() < enough:
-            weights = moved
-            break
-        if np.sum(gradient * change) > 0:
-            momentum = 1.0
-        following = (1 + np.sqrt(1 + 4 * momentum**2)) / 2
-        ahead = moved + (momentum - 1) / following * change
-        weights, momentum = moved, following
-    return weights / scale
+    change = _Change(inner, coupling, start, strength, free)
+    weights = start.copy()
+    weights[free] = np.maximum(start[free] + minimise(change, -start[free], np.zeros_like(start[free])), 0)
+    return weights
 
 
-def _coupled(rows: Array, strength: float) -> Array:
-    """``(I + s D2^T D2) rows`` for rows over time ``(T, K)``."""
-    bends = strength * (rows[2:] - 2 * rows[1:-1] + rows[:-2])
-    out = rows.copy()
-    out[2:] += bends
-    out[1:-1] -= 2 * bends
-    out[:-2] += bends
-    return out
+class _Change:
+    """What a change ``u`` (n, K) of the free frames' weights costs: ``(I + s D2^T D2) (x) G`` and its linear part."""
+
+    def __init__(self, inner: Array, coupling: Array, start: Array, strength: float, free: Bools) -> None:
+        second = sp.diags([1.0, -2.0, 1.0], [0, 1, 2], shape=(len(start) - 2, len(start)))
+        time = sp.csr_matrix(sp.identity(len(start)) + strength * (second.T @ second))[free]
+        self._offset = np.asarray(time @ (start @ inner - coupling))
+        # Frames keep their order, so five bands remain five.
+        self._time, self._gram = time[:, free], _definite(inner)
+        self._bands = FrameBands([(self._time, self._gram)])
+
+    @property
+    def diagonal(self) -> Array:
+        """Of the matrix, (n, K)."""
+        return self._bands.diagonal
+
+    def gradient(self, change: Array) -> Array:
+        """Half of it, (n, K)."""
+        return np.asarray(self._time @ (change @ self._gram)) + self._offset
+
+    def system(self, *, extra: Array | None = None, stuck: Bools | None = None) -> LinearSystem:
+        """As `toolkit.bounded` asks for it."""
+        return self._bands.factor(extra, stuck)
+
+
+def _definite(inner: Array) -> Array:
+    """``inner`` and as much of its diagonal as makes it safely definite, in spite of rounding."""
+    size = np.where(np.diag(inner) > 0, np.diag(inner), 1.0)
+    root = np.sqrt(size)
+    least = float(np.linalg.eigvalsh(inner / np.outer(root, root))[0])
+    return np.asarray(inner + max(_DEFINITE - least, 0.0) * np.diag(size))

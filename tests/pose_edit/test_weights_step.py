@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from toolkit.pose_edit.banded import FrameRows
+from toolkit.banded import FrameRows
 from toolkit.pose_edit.weights_step import WeightsProblem, time_matrix
 
 
@@ -52,7 +52,7 @@ def test_a_drag_needs_no_interior_point(monkeypatch: pytest.MonkeyPatch) -> None
     assert 0 < (last == problem.lower).sum() < last.size
     asked = [1.02 * goals, 1.04 * goals, goals]
     cold = [problem.solve(rows, one, metric, np.zeros((n, k))) for one in asked]
-    monkeypatch.setattr(WeightsProblem, "_interior_point", None)
+    monkeypatch.setattr("toolkit.bounded._interior_point", None)
     for one, other in zip(asked, cold, strict=True):
         last = problem.solve(rows, one, metric, last)
         assert np.abs(last - other).max() < 1e-9

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.pose_edit.banded import FrameRows
+from toolkit.banded import FrameRows
 from toolkit.pose_edit.bases_step import bases_metric
 from toolkit.pose_edit.constraints import ConstraintRows
 from toolkit.pose_edit.parameters import EditParameters

@@ -1,32 +1,34 @@
-"""Banded systems of the weights step, made anew in each of its steps.
+"""Banded systems over a take's frames, for solvers that make them anew in each of their steps.
 
-Unknowns are the weights ``(n, K)`` of n frames. Without fixed vertices each weight's curve is a chain of its own, five
-bands wide: all K of them run side by side here, LAPACK would take one after the other. Fixed vertices couple the
-weights of a frame, and time couples a frame with the next two: one system of 4 K + 1 bands, frame by frame.
+Unknowns are the weights ``(n, K)`` of n frames, and time couples a frame with the next two. Where nothing else couples
+them, each weight's curve is a chain of its own, five bands wide: all K of them run side by side here, LAPACK would take
+one after the other. What couples the weights of a frame makes them one system, frame by frame.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.linalg import cholesky_banded
-from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.linalg.lapack import dpbtrf
 
 from toolkit.compiled import ARITHMETIC, LOOPS, njit
 
-__all__ = ["FrameRows", "SmallFactor", "System", "chain_bands", "frame_bands"]
+__all__ = ["Bands", "ChainBands", "FrameBands", "FrameRows"]
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 Ids = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class FrameRows:
-    """``B``: row a sees only frame ``frames[a]`` of the window, ``(B u)_a = local[a] . u[frames[a]]``, local (R, K)."""
+    """``B``: row a sees only frame ``frames[a]`` of the n, ``(B u)_a = local[a] . u[frames[a]]``, local (R, K)."""
 
     frames: Ids
     local: Array
@@ -54,79 +56,70 @@ class FrameRows:
         return result
 
 
-def chain_bands(time: sp.csr_matrix, n_bases: int) -> Array:
-    """Lower bands (3, n, K) of ``Q`` for every weight's curve."""
-    n = time.shape[0]
-    bands = np.stack([np.pad(time.diagonal(offset), (0, min(offset, n))) for offset in range(3)])
-    return np.repeat(bands[:, :, None], n_bases, axis=2)
+class ChainBands:
+    """``Q (x) I``: K curves side by side; ``time`` = Q (n, n) of five bands."""
 
+    def __init__(self, time: sp.csr_matrix, n_bases: int) -> None:
+        self._lower = np.repeat(_diagonals(time)[:, :, None], n_bases, axis=2)
 
-def frame_bands(time: sp.csr_matrix, gram: Array) -> Array:
-    """Lower bands (2 K + 1, n K) of ``Q (x) I + I (x) G``."""
-    (n, _), n_bases = time.shape, len(gram)
-    bands = np.zeros((2 * n_bases + 1, n * n_bases))
-    for offset in range(n_bases):
-        bands[offset] = np.tile(np.pad(np.diagonal(gram, offset), (0, offset)), n)
-    for step in range(3):
-        bands[step * n_bases] += np.repeat(np.pad(time.diagonal(step), (0, min(step, n))), n_bases)
-    return bands
+    @property
+    def diagonal(self) -> Array:
+        """Of the matrix, (n, K); what is added to it is added to the matrix."""
+        return self._lower[0]
 
-
-class SmallFactor:
-    """LU factors of a small matrix (R, R), by LAPACK itself: SciPy's own call takes longer than the work."""
-
-    def __init__(self, matrix: Array) -> None:
-        self._factors, self._pivots, failed = dgetrf(matrix)
-        if failed:
-            raise np.linalg.LinAlgError("the constraints' matrix is singular")
-
-    def solve(self, right: Array) -> Array:
-        """Solve for (R,)."""
-        return np.asarray(dgetrs(self._factors, self._pivots, right)[0])
-
-
-class System:
-    """``P + diag(extra) + B^T M^-1 B``: the banded part ``P`` factorised, the few rows by Woodbury's formula.
-
-    Parameters
-    ----------
-    bands : of ``P``, from `chain_bands` or `frame_bands`
-    rows, metric : ``B`` and ``M`` (R, R)
-    extra : (n, K), not negative, or None
-    stuck : (n, K), the weights that cannot move, or None
-    """
-
-    def __init__(
-        self,
-        bands: Array,
-        rows: FrameRows,
-        metric: Array,
-        extra: Array | None = None,
-        stuck: NDArray[np.bool_] | None = None,
-    ) -> None:
-        self._stuck, self._rows = stuck, rows
-        made = bands.copy()
+    def factor(self, extra: Array | None = None, stuck: Bools | None = None) -> _Chains:
+        """Of the matrix and ``diag(extra)`` (n, K), the identity for all that is ``stuck`` (n, K)."""
+        made = self._lower.copy()
         if extra is not None:
-            made[0] += extra.reshape(made[0].shape)
+            made[0] += extra
         if stuck is not None:
-            self._rows = FrameRows(rows.frames, np.where(stuck[rows.frames], 0.0, rows.local))
-            _strike(made, ~stuck.reshape(made[0].shape))
-        self._factor = _Chains(made) if made.ndim == 3 else _Frames(made)
-        self._small = SmallFactor(metric + self._factor.answers(self._rows))
-
-    def solve(self, right: Array) -> Array:
-        """Solve for one right-hand side (n, K); what cannot move stays zero."""
-        alone = self._factor.solve(right if self._stuck is None else np.where(self._stuck, 0.0, right))
-        pull = self._small.solve(self._rows.of(alone))
-        return np.asarray(alone - self._factor.solve(self._rows.spread(pull, alone)))
+            free = ~stuck
+            for offset in range(3):
+                length = max(len(free) - offset, 0)
+                made[offset, :length] *= free[:length] & free[len(free) - length :]
+            made[0][stuck] = 1
+        return _Chains(made)
 
 
-def _strike(bands: Array, free: NDArray[np.bool_]) -> None:
-    """Make rows and columns of the identity for all that is not free, in place."""
-    for offset in range(len(bands)):
-        length = max(len(free) - offset, 0)
-        bands[offset, :length] *= free[:length] & free[len(free) - length :]
-    bands[0, ~free] = 1
+class FrameBands:
+    """``sum_i Q_i (x) S_i``: the weights of a frame together; ``terms`` are pairs of Q (n, n), five bands, S (K, K)."""
+
+    def __init__(self, terms: Sequence[tuple[sp.csr_matrix, Array]]) -> None:
+        n, n_bases = terms[0][0].shape[0], len(terms[0][1])
+        # Each weight's column, (n, K, 3 K), from the first weight of its frame on; then from the diagonal on.
+        columns = sum(np.einsum("jt,kl->tkjl", _diagonals(time), small) for time, small in terms)
+        columns = np.reshape(columns, (n, n_bases, 3 * n_bases))
+        lower = np.zeros_like(columns)
+        for k in range(n_bases):
+            lower[:, k, : 3 * n_bases - k] = columns[:, k, k:]
+        width = 1 + int(np.flatnonzero(lower.any(axis=(0, 1))).max(initial=0))
+        self._lower = np.ascontiguousarray(lower[:, :, :width])
+
+    @property
+    def diagonal(self) -> Array:
+        """As of `ChainBands`."""
+        return self._lower[:, :, 0]
+
+    def factor(self, extra: Array | None = None, stuck: Bools | None = None) -> _Frames:
+        """As of `ChainBands`; LinAlgError if the matrix is not positive definite."""
+        made = self._lower.reshape(-1, self._lower.shape[2]).copy()
+        if extra is not None:
+            made[:, 0] += extra.ravel()
+        if stuck is not None:
+            free = ~stuck.ravel()
+            made *= sliding_window_view(np.pad(free, (0, made.shape[1] - 1)), made.shape[1])
+            made[~free] = 0
+            made[~free, 0] = 1
+        return _Frames(made)
+
+
+Bands = ChainBands | FrameBands
+
+
+def _diagonals(time: sp.csr_matrix) -> Array:
+    """The diagonal and the two below it, (3, n)."""
+    n = time.shape[0]
+    return np.stack([np.pad(time.diagonal(-offset), (0, min(offset, n))) for offset in range(3)])
 
 
 class _Chains:
@@ -148,16 +141,17 @@ class _Chains:
 
 
 class _Frames:
-    """All weights of a frame together; ``bands`` (2 K + 1, n K)."""
+    """All weights of a frame together; ``bands`` (n K, W) become L's columns."""
 
     def __init__(self, bands: Array) -> None:
-        factor = cholesky_banded(bands, overwrite_ab=True, lower=True, check_finite=False)
-        self._factor = np.ascontiguousarray(factor.T)
+        _, failed = dpbtrf(bands.T, lower=1, overwrite_ab=1)
+        if failed:
+            raise np.linalg.LinAlgError("the weights' matrix is not positive definite")
+        self._factor = bands
 
     def solve(self, right: Array) -> Array:
-        solved = right.reshape(-1, 1).copy()
-        _forward(self._factor, solved, 0)
-        _backward(self._factor, solved)
+        solved = right.flatten()
+        _substitute(self._factor, solved)
         return solved.reshape(right.shape)
 
     def answers(self, rows: FrameRows) -> Array:
@@ -263,14 +257,18 @@ def _forward(factor, columns, first):  # type: ignore[no-untyped-def]  # compile
                 columns[i + j, c] -= factor[i, j] * columns[i, c]
 
 
-@njit(**LOOPS)
-def _backward(factor, columns):  # type: ignore[no-untyped-def]  # compiled
-    """``L^-T columns`` (N, C) in place."""
+# Sums in any order: else a dot product is one number after the other.
+@njit(**ARITHMETIC | {"fastmath": {"contract", "reassoc"}})
+def _substitute(factor, x):  # type: ignore[no-untyped-def]  # compiled
+    """``L^-T L^-1 x`` (N,) in place; ``factor`` as for `_forward`."""
     n, width = factor.shape
-    count = columns.shape[1]
-    for i in range(n - 1, -1, -1):
+    for i in range(n):
+        value = x[i] / factor[i, 0]
+        x[i] = value
         for j in range(1, min(width, n - i)):
-            for c in range(count):
-                columns[i, c] -= factor[i, j] * columns[i + j, c]
-        for c in range(count):
-            columns[i, c] /= factor[i, 0]
+            x[i + j] -= factor[i, j] * value
+    for i in range(n - 1, -1, -1):
+        value = 0.0
+        for j in range(1, min(width, n - i)):
+            value += factor[i, j] * x[i + j]
+        x[i] = (x[i] - value) / factor[i, 0]
