@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
+from toolkit.mesh.topology import edge_components
 from toolkit.remembered import remembered
 
 __all__ = ["EdgeTable", "edge_table"]
@@ -50,12 +50,7 @@ class EdgeTable:
     @cached_property
     def parts(self) -> Ids:
         """Label ``(V,)`` of the connected part of each vertex; a lone vertex is a part of its own."""
-        starts = np.searchsorted(self.edges[:, 0], np.arange(self.n_vertices + 1))
-        shape = (self.n_vertices, self.n_vertices)
-        ends = np.ascontiguousarray(self.edges[:, 1])  # some releases of SciPy take no other
-        graph = sp.csr_matrix((np.ones(len(self.edges), dtype=np.int8), ends, starts), shape=shape)
-        labels: Ids = connected_components(graph, directed=False)[1]
-        return labels
+        return edge_components(self.edges, self.n_vertices)[1]
 
 
 @remembered

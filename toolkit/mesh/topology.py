@@ -14,6 +14,7 @@ __all__ = [
     "boundary_vertices",
     "connected_components",
     "directed_edges",
+    "edge_components",
     "edge_counts",
     "unique_edges",
     "vertex_adjacency",
@@ -60,7 +61,15 @@ def vertex_adjacency(triangles: NDArray[np.integer], n_vertices: int) -> sp.csr_
 
 def connected_components(triangles: NDArray[np.integer], n_vertices: int) -> tuple[int, NDArray[np.int32]]:
     """Return the number of components and the label ``(V,)`` of each vertex; a lone vertex is its own component."""
-    count, labels = _components(vertex_adjacency(triangles, n_vertices), directed=False)
+    return edge_components(unique_edges(triangles), n_vertices)
+
+
+def edge_components(edges: NDArray[np.integer], n_vertices: int) -> tuple[int, NDArray[np.int32]]:
+    """As `connected_components`, for edges ``(E, 2)`` that are sorted, each once, lower id first."""
+    # Such edges are the rows of a sparse matrix as they are; some releases of SciPy take contiguous arrays only.
+    starts, ends = np.searchsorted(edges[:, 0], np.arange(n_vertices + 1)), np.ascontiguousarray(edges[:, 1])
+    graph = sp.csr_matrix((np.ones(len(edges), np.int8), ends, starts), shape=(n_vertices, n_vertices))
+    count, labels = _components(graph, directed=False)
     return int(count), labels
 
 
