@@ -5,8 +5,9 @@ import pytest
 import scipy.sparse as sp
 
 from toolkit.mesh import TriangleMesh
+from toolkit.mesh.topology import vertex_adjacency
 from toolkit.operators import uniform_laplacian
-from toolkit.solve import SingularMatrixError, factorise
+from toolkit.solve import PulledSolve, SingularMatrixError, factorise
 
 
 def _system(mesh: TriangleMesh) -> sp.csc_matrix:
@@ -30,8 +31,31 @@ def test_one_right_hand_side_keeps_its_shape(bump: TriangleMesh) -> None:
     assert np.abs(solved - x).max() < 1e-9
 
 
-def test_a_floating_part_is_refused() -> None:
+@pytest.mark.parametrize("columns", [2, 16, 37])
+def test_pulls_found_on_the_way_are_those_given_at_once(bump: TriangleMesh, columns: int) -> None:
+    matrix, rng = _system(bump), np.random.default_rng(2)
+    right, unknowns = rng.normal(size=(bump.n_vertices, columns)), np.array([400, 7, 8, 390, 743])
+    factor = factorise(matrix)
+    solving = PulledSolve(factor, right, unknowns)
+    for _ in range(2):
+        pulls = rng.normal(size=(len(unknowns), columns))
+        pulled = right.copy()
+        pulled[unknowns] += pulls
+        at_once = factor.solve(pulled)
+        assert np.abs(solving.at_unknowns(pulls) - at_once[unknowns]).max() < 1e-10 * np.abs(at_once).max()
+    assert np.abs(solving.everywhere(pulls) - at_once).max() < 1e-10 * np.abs(at_once).max()
+
+
+def test_a_floating_part_is_refused(bump: TriangleMesh) -> None:
     """A Laplacian without a gauge leaves a constant free."""
+    n = bump.n_vertices
+    adjacency = vertex_adjacency(bump.triangles, n)
+    floating = sp.diags(np.asarray(adjacency.sum(axis=1)).ravel()) - adjacency
+    held = sp.block_diag([floating + sp.identity(n), floating + sp.csr_matrix(([1e-6], ([3], [3])), shape=(n, n))])
+    factorise(held)
+    for scale in (1, 1 / 3, 1e6):  # zero but for the rounding that each has of its own
+        with pytest.raises(SingularMatrixError, match=f"{2 * n} x {2 * n}"):
+            factorise(sp.block_diag([floating + sp.identity(n), scale * floating]))
     path = sp.diags([[-1.0] * 9, [1.0, *[2.0] * 8, 1.0], [-1.0] * 9], [-1, 0, 1])
     with pytest.raises(SingularMatrixError, match="10 x 10"):
         factorise(sp.block_diag([path]))

@@ -7,48 +7,47 @@ the edits, cheap. CHOLMOD factorises by supernodes, which are dense; cvxopt woul
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from toolkit.blocks import map_blocks
-from toolkit.substitution import substitute, without_zeros
+from toolkit.substitution import part_of, substitute_backward, substitute_forward, with_ancestors, without_zeros
 
-__all__ = ["Factor", "SingularMatrixError", "factorise"]
+__all__ = ["Factor", "PulledSolve", "SingularMatrixError", "factorise"]
+
+Array = NDArray[np.float64]
 
 # Right-hand sides that a thread takes together: a row of so many is two cache lines.
 _COLUMNS = 16
+# A pivot that is less than this share of the unknown's own entry in the matrix is zero but for rounding.
+_NO_PIVOT = 1e-12
 
 
 class SingularMatrixError(ValueError):
     """The matrix leaves something undetermined; the message says how many unknowns there are."""
 
 
+@dataclass(frozen=True, eq=False)
 class Factor:
-    """Sparse Cholesky factorisation of a symmetric positive definite matrix ``A`` ``(n, n)``.
+    """Sparse Cholesky factorisation ``A[order][:, order] = L L^T`` of a matrix ``(n, n)``, made by `factorise`.
 
-    ``factor.solve(B)`` returns ``X`` with ``A X = B`` for one ``(n,)`` or many ``(n, k)`` right-hand sides.
+    ``lower`` is ``L`` as `toolkit.substitution` takes it.
     """
 
-    def __init__(self, matrix: sp.spmatrix) -> None:
-        if matrix.shape[0] != matrix.shape[1]:
-            raise ValueError(f"a square matrix is needed, got {matrix.shape}")
-        self.n = matrix.shape[0]
-        try:
-            self._order, parts = _cholesky(matrix)
-        except ArithmeticError as error:
-            raise self._singular() from error
-        self._starts, self._rows, self._values = without_zeros(*parts)
-        # A pivot that is zero but for rounding passes; a probe shows it.
-        probe = np.linspace(-1, 1, self.n)
-        residual = np.abs(matrix @ self.solve(matrix @ probe) - matrix @ probe).max(initial=0)
-        if not residual <= 1e-3 * max(float(np.abs(matrix @ probe).max(initial=0)), 1e-300):
-            raise self._singular()
+    order: NDArray[np.uint32]
+    lower: tuple[NDArray[np.int64], NDArray[np.uint32], Array]
 
-    def solve(self, right: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Solve for one ``(n,)`` or many ``(n, k)`` right-hand sides."""
+    @property
+    def n(self) -> int:
+        """The number of unknowns."""
+        return len(self.order)
+
+    def solve(self, right: NDArray[np.floating]) -> Array:
+        """``X`` with ``A X = B`` for one ``(n,)`` or many ``(n, k)`` right-hand sides."""
         dense = np.require(right, np.float64, ["C", "W"])  # one kind of array, or the loop is compiled for each
         if dense.shape[0] != self.n:
             raise ValueError(f"the right-hand side has {dense.shape[0]} rows, the matrix {self.n}")
@@ -56,18 +55,101 @@ class Factor:
         result = np.empty(columns.shape)
 
         def work(first: int, last: int) -> None:
-            substitute(self._starts, self._rows, self._values, self._order, first, last, columns, result)
+            self.backward(self.forward(columns, first, last), first, last, result)
 
-        if columns.shape[1] <= _COLUMNS:
-            work(0, columns.shape[1])
-        else:
-            map_blocks(work, columns.shape[1], _COLUMNS, what="substituting")
+        _by_columns(work, columns.shape[1])
         return result.reshape(dense.shape)
 
-    def _singular(self) -> SingularMatrixError:
-        return SingularMatrixError(
-            f"the {self.n} x {self.n} system is singular; some part of the mesh is held by nothing"
-        )
+    def forward(self, right: Array, first: int, last: int) -> Array:
+        """The first half of a solve, for columns ``first <= c < last`` of ``right`` (n, k): ``L^-1 right[order]``."""
+        return np.asarray(substitute_forward(self.lower, self.order, first, last, right))
+
+    def backward(self, half: Array, first: int, last: int, out: Array) -> None:
+        """The second half: ``L^-T half`` into these columns of ``out`` (n, k); ``half`` is spent."""
+        substitute_backward(self.lower, self.order, half, first, last, out)
+
+
+class PulledSolve:
+    """``A X = B`` where what ``B`` is at a few unknowns depends on what ``X`` is there.
+
+    Forward substitution carries a pull at an unknown to its ancestors in the elimination tree only, and in backward
+    substitution it depends on these only. Their part of ``L`` is therefore a factor itself, that of the matrix from
+    which all others are eliminated, and ``B`` is substituted forward once. Exact, at a third of a substitution's cost
+    for the rims of a face's eyes and mouth.
+
+    Parameters
+    ----------
+    factor : of ``A`` (n, n)
+    right : (n, k)
+    unknowns : (u,) those that are pulled or asked for
+    """
+
+    def __init__(self, factor: Factor, right: Array, unknowns: NDArray[np.integer]) -> None:
+        self._factor, self._n_columns = factor, right.shape[1]
+        position = np.empty(factor.n, dtype=np.int64)
+        position[factor.order] = np.arange(factor.n)
+        reached = np.zeros(factor.n, dtype=bool)
+        reached[position[unknowns]] = True
+        with_ancestors(factor.lower, reached)
+        self._reached = np.flatnonzero(reached)
+        self._at = np.searchsorted(self._reached, position[unknowns])
+        order = np.arange(len(self._reached), dtype=np.uint32)
+        self._part = Factor(order, part_of(factor.lower, self._reached))
+        self._halves: dict[int, Array] = {}
+
+        def work(first: int, last: int) -> None:
+            self._halves[first] = factor.forward(right, first, last)
+
+        _by_columns(work, self._n_columns)
+
+    def at_unknowns(self, pulls: Array) -> Array:
+        """What ``X`` is at the unknowns if ``pulls`` (u, k) are added to ``B`` there, ``(u, k)``."""
+        placed = self._placed(pulls)
+        result = np.empty(placed.shape)
+
+        def work(first: int, last: int) -> None:
+            half = self._part.forward(placed, first, last)
+            half += self._halves[first][self._reached]
+            self._part.backward(half, first, last, result)
+
+        _by_columns(work, self._n_columns)
+        return np.asarray(result[self._at])
+
+    def everywhere(self, pulls: Array) -> Array:
+        """``X`` (n, k) if ``pulls`` (u, k) are added to ``B``; the last thing to ask for, since it takes the memory."""
+        placed = self._placed(pulls)
+        result = np.empty((self._factor.n, self._n_columns))
+
+        def work(first: int, last: int) -> None:
+            half = self._halves.pop(first)
+            half[self._reached] += self._part.forward(placed, first, last)
+            self._factor.backward(half, first, last, result)
+
+        _by_columns(work, self._n_columns)
+        return result
+
+    def _placed(self, pulls: Array) -> Array:
+        placed = np.zeros((self._part.n, self._n_columns))
+        placed[self._at] = pulls
+        return placed
+
+
+def factorise(matrix: sp.spmatrix) -> Factor:
+    """Factorise a symmetric positive definite matrix ``(n, n)``; `SingularMatrixError` where it is not."""
+    n = matrix.shape[0]
+    if matrix.shape[1] != n:
+        raise ValueError(f"a square matrix is needed, got {matrix.shape}")
+    singular = SingularMatrixError(f"the {n} x {n} system is singular; some part of the mesh is held by nothing")
+    try:
+        order, parts = _cholesky(matrix)
+    except ArithmeticError as error:
+        raise singular from error
+    starts, rows, values = without_zeros(*parts)
+    # A pivot that is zero but for rounding passes.
+    pivots = values[starts[:-1]] ** 2
+    if not (pivots > _NO_PIVOT * matrix.diagonal()[order]).all():
+        raise singular
+    return Factor(order, (starts, rows, values))
 
 
 def _cholesky(matrix: sp.spmatrix) -> tuple[NDArray[np.uint32], Iterator[NDArray]]:
@@ -90,6 +172,9 @@ def _cholesky(matrix: sp.spmatrix) -> tuple[NDArray[np.uint32], Iterator[NDArray
     return np.array(order).ravel().astype(np.uint32), found
 
 
-def factorise(matrix: sp.spmatrix) -> Factor:
-    """Factorise a symmetric positive definite matrix; see `Factor`."""
-    return Factor(matrix)
+def _by_columns(work: Callable[[int, int], None], n_columns: int) -> None:
+    """Call ``work(first, last)`` for blocks of columns, on threads where there are several."""
+    if n_columns <= _COLUMNS:
+        work(0, n_columns)
+    else:
+        map_blocks(work, n_columns, _COLUMNS, what="substituting")
