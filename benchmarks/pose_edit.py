@@ -159,9 +159,8 @@ def made_up_take(n_vertices: int, n_bases: int, n_frames: int) -> tuple[Editable
     t = np.arange(n_frames)[:, None]
     speed, phase = rng.uniform(0.01, 0.06, n_bases), rng.uniform(0, 2 * np.pi, n_bases)
     weights = np.clip(np.sin(speed * t + phase), 0, None) ** 2
-    motion = np.sqrt((moves**2).sum(axis=2)).max(axis=0)
-    plain = TransferParameters(feature_lines=False, contacts=False)
-    system = DeformationTransfer(mesh.vertices, mesh.vertices, mesh.triangles, motion, parameters=plain)
+    plain = TransferParameters(feature_lines=False, contacts=False, robust=False)
+    system = DeformationTransfer(mesh.vertices, mesh.vertices, mesh.triangles, moves, parameters=plain)
     return EditableTake(mesh.vertices, moves, weights, system), mesh.triangles
 
 

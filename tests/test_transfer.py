@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,10 +17,9 @@ from toolkit.transfer import (
     DeformationTransfer,
     TransferParameters,
     line_gradients,
-    triangle_weights,
 )
 
-PLAIN = TransferParameters(feature_lines=False, contacts=False)
+PLAIN = TransferParameters(feature_lines=False, contacts=False, robust=False)
 
 
 def other_face(mesh: TriangleMesh) -> np.ndarray:
@@ -72,8 +72,7 @@ def test_equals_the_four_vertex_form(bump: TriangleMesh) -> None:
     target = other_face(TriangleMesh(source, triangles))
     shape = bent(source)
     slow = four_vertex_transfer(source, shape, target, triangles)
-    transfer = DeformationTransfer(source, target, triangles, np.ones(len(source)), parameters=PLAIN)
-    quick = transfer.solve(shape[None])[0]
+    quick = DeformationTransfer(source, target, triangles, shape[None] - source, parameters=PLAIN).solve()[0]
     quick += (slow - quick).mean(axis=0)  # the position as a whole is the gauge's business
     assert np.abs(quick - slow).max() < 1e-8
     assert np.abs(slow - target).max() > 0.1
@@ -93,24 +92,17 @@ def test_onto_itself_gives_the_source(bump: TriangleMesh, take: np.ndarray, with
     opening, lines = mouth(bump)
     pairs = find_contacts([opening], bump.vertices, shapes)
     contact_map = ContactMap(pairs, bump.vertices, bump.vertices)
-    motion = np.linalg.norm(shapes - bump.vertices, axis=2).max(axis=0)
-    transfer = DeformationTransfer(
-        bump.vertices,
-        bump.vertices,
-        bump.triangles,
-        motion,
-        line_edges(lines) if with_lines else None,
-        pairs if with_lines else None,
-        weights=triangle_weights(bump.vertices, shapes, bump.triangles),
-    )
-    result = transfer.solve(shapes, contact_map(pairs.gaps(shapes)))
+    given = (line_edges(lines), pairs) if with_lines else ()
+    transfer = DeformationTransfer(bump.vertices, bump.vertices, bump.triangles, shapes - bump.vertices, *given)
+    result = transfer.solve(contact_map(pairs.gaps(shapes)) if with_lines else None)
     assert np.abs(result - shapes).max() < 1e-9 * bump.diagonal
 
 
 def test_no_deformation_gives_the_target_exactly(bump: TriangleMesh) -> None:
     target = other_face(bump)
-    transfer = DeformationTransfer(bump.vertices, target, bump.triangles, np.ones(bump.n_vertices), parameters=PLAIN)
-    assert np.abs(transfer.solve(bump.vertices[None])[0] - target).max() < 1e-12
+    still = np.zeros((1, bump.n_vertices, 3))
+    result = DeformationTransfer(bump.vertices, target, bump.triangles, still).solve()[0]
+    assert np.abs(result - target).max() < 1e-12
 
 
 def test_contacts_close_what_closes(bump: TriangleMesh) -> None:
@@ -125,12 +117,12 @@ def test_contacts_close_what_closes(bump: TriangleMesh) -> None:
     pairs = find_contacts([opening], vertices, closed[None])
     assert pairs.closes.all()
     goals = ContactMap(pairs, vertices, target)(pairs.gaps(closed[None]))
-    motion = np.linalg.norm(closed - vertices, axis=1)
     gaps = {}
     for contacts in (False, True):
-        parameters = TransferParameters(feature_lines=False, contacts=contacts)
-        transfer = DeformationTransfer(vertices, target, bump.triangles, motion, None, pairs, parameters)
-        gaps[contacts] = np.linalg.norm(pairs.gaps(transfer.solve(closed[None], goals)[0]), axis=1)
+        parameters = TransferParameters(feature_lines=False, contacts=contacts, robust=False)
+        moves = closed[None] - vertices
+        transfer = DeformationTransfer(vertices, target, bump.triangles, moves, None, pairs, parameters)
+        gaps[contacts] = np.linalg.norm(pairs.gaps(transfer.solve(goals if contacts else None)[0]), axis=1)
     rest = np.linalg.norm(pairs.gaps(target), axis=1)
     assert gaps[True].max() < 0.1 * rest.mean()
     assert gaps[False].max() > 0.25 * rest.mean()
@@ -167,31 +159,28 @@ def test_feature_lines_keep_their_shape(bump: TriangleMesh) -> None:
     target, shape = other_face(bump), bent(bump.vertices)
     errors = []
     for weight in (0.0, 1e6):
-        parameters = TransferParameters(contacts=False, line_weight=weight)
-        transfer = DeformationTransfer(
-            bump.vertices, target, bump.triangles, np.ones(bump.n_vertices), edges, None, parameters
-        )
-        result = transfer.solve(shape[None])[0]
-        rest = target[edges[:, 1]] - target[edges[:, 0]]
-        wanted = line_gradients(bump.vertices, shape, edges, rest)
+        parameters = TransferParameters(contacts=False, robust=False, line_weight=weight)
+        moves = shape[None] - bump.vertices
+        result = DeformationTransfer(
+            bump.vertices, target, bump.triangles, moves, edges, parameters=parameters
+        ).solve()[0]
+        before, after, rest = (x[edges[:, 1]] - x[edges[:, 0]] for x in (bump.vertices, shape, target))
+        wanted = line_gradients(before, after, rest)
         errors.append(np.abs(result[edges[:, 1]] - result[edges[:, 0]] - wanted).max())
     assert errors[1] < 1e-3 * errors[0]
 
 
 def test_line_gradient_is_a_rotation_and_a_stretch() -> None:
     rng = np.random.default_rng(1)
-    rest, shape = rng.normal(size=(2, 20, 3))
-    edges = np.stack([np.arange(10), np.arange(10, 20)], axis=1)
-    edge = rest[edges[:, 1]] - rest[edges[:, 0]]
-    new_edge = shape[edges[:, 1]] - shape[edges[:, 0]]
-    assert np.allclose(line_gradients(rest, shape, edges, edge), new_edge)
+    edge, new_edge, other = rng.normal(size=(3, 10, 3))
+    assert np.allclose(line_gradients(edge, new_edge, edge), new_edge)
     ratio = np.linalg.norm(new_edge, axis=1) / np.linalg.norm(edge, axis=1)
-    other = rng.normal(size=(10, 3))
-    turned = line_gradients(rest, shape, edges, other)
+    turned = line_gradients(edge, new_edge, other)
     assert np.allclose(np.linalg.norm(turned, axis=1), ratio * np.linalg.norm(other, axis=1))
     axis = np.cross(edge, new_edge)
-    assert np.allclose(line_gradients(rest, shape, edges, axis), ratio[:, None] * axis)
-    assert np.allclose(line_gradients(rest, rest, edges, other), other)
+    assert np.allclose(line_gradients(edge, new_edge, axis), ratio[:, None] * axis)
+    several = line_gradients(edge, np.stack([edge, new_edge]), other)
+    assert np.allclose(several, [other, turned])
 
 
 def test_parts_stay_with_the_face(bump: TriangleMesh) -> None:
@@ -203,15 +192,14 @@ def test_parts_stay_with_the_face(bump: TriangleMesh) -> None:
     shape[:n] = rest[:n] + np.outer(np.clip(-rest[:n, 1], 0, None), [0, -0.3, 0])
     shape[n : 2 * n] += [0, -0.3, 0.05]
     target = rest * [1.2, 0.9, 1.1]
-    motion = np.linalg.norm(shape - rest, axis=1)
-    moved = DeformationTransfer(rest, target, triangles, motion, parameters=PLAIN).solve(shape[None])[0] - target
+    moved = DeformationTransfer(rest, target, triangles, shape[None] - rest, parameters=PLAIN).solve()[0] - target
     assert np.allclose(moved[n : 2 * n], [0, -0.3, 0.05], atol=1e-9)
     assert np.abs(moved[2 * n :]).max() < 1e-9
 
 
-@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize("robust", [False, True])
 @pytest.mark.parametrize("collapsed", ["", "source", "target"])
-def test_the_normal_equations_are_those_of_the_energy(bump: TriangleMesh, weighted: bool, collapsed: str) -> None:
+def test_the_normal_equations_are_those_of_the_energy(bump: TriangleMesh, robust: bool, collapsed: str) -> None:
     """Oracle by another solver: the rows of every triangle, stacked and solved iteratively.
 
     A triangle without an area on the source says that nothing is deformed there; one on the target says nothing.
@@ -223,13 +211,13 @@ def test_the_normal_equations_are_those_of_the_energy(bump: TriangleMesh, weight
         if name == collapsed:
             a, b, c = triangles[flat]
             rest[c] = 0.4 * rest[a] + 0.6 * rest[b]
-    weights = np.linspace(0.2, 1, len(triangles)) if weighted else np.ones(len(triangles))
     transfer = DeformationTransfer(
-        source, target, triangles, np.ones(len(source)), parameters=PLAIN, weights=weights if weighted else None
+        source, target, triangles, shape[None] - source, parameters=replace(PLAIN, robust=robust)
     )
-    n, held = len(source), transfer._held
-    rows, right = [np.sqrt(transfer._hold)[:, None] * np.eye(n)[held]], []
-    right.append(np.sqrt(transfer._hold)[:, None] * (shape - source)[held])
+    n, strength = len(source), np.sqrt(transfer.hold)[:, None]
+    assert transfer.hold.any()
+    assert (np.ptp(transfer.weights) > 0.1) == robust
+    rows, right = [strength * np.eye(n)], [strength * (shape - source)]
     for f, t in enumerate(triangles):
         if collapsed == "target" and f == flat:
             continue
@@ -239,23 +227,27 @@ def test_the_normal_equations_are_those_of_the_energy(bump: TriangleMesh, weight
         gradient[:, t[0]] = -gradient[:, t[1:]].sum(axis=1)
         still = collapsed == "source" and f == flat
         change = np.zeros((3, 3)) if still else spanned(shape, t) @ np.linalg.inv(spanned(source, t)) - np.eye(3)
-        rows.append(np.sqrt(weights[f]) * gradient)
-        right.append(np.sqrt(weights[f]) * change.T)
+        rows.append(np.sqrt(transfer.weights[f]) * gradient)
+        right.append(np.sqrt(transfer.weights[f]) * change.T)
     system, goals = sp.csr_matrix(np.concatenate(rows)), np.concatenate(right)
-    result = transfer.solve(shape[None])[0] - target
+    result = transfer.solve()[0] - target
     for c in range(3):
         slow = lsqr(system, goals[:, c], atol=1e-14, btol=1e-14, iter_lim=20000)[0]
         assert np.abs(result[:, c] - slow).max() < 1e-7
 
 
 def test_extreme_triangles_count_less(bump: TriangleMesh) -> None:
+    def weights(shapes: np.ndarray, rest: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+        return DeformationTransfer(rest, rest, triangles, shapes - rest).weights
+
     half_turn = Rotation.from_rotvec([0, 0, np.pi]).apply(bump.vertices)
-    assert np.allclose(triangle_weights(bump.vertices, bump.vertices[None], bump.triangles), 1)
+    assert np.allclose(weights(bump.vertices[None], bump.vertices, bump.triangles), 1)
     # |J - I|^2 of a half turn is 4 + 4; the largest of all shapes counts.
-    weights = triangle_weights(bump.vertices, np.stack([half_turn, bump.vertices]), bump.triangles)
-    assert np.allclose(weights, 1 / 9)
-    collapsed = np.array([[0, 0, 0.0], [1, 0, 0], [2, 0, 0]])
-    assert np.allclose(triangle_weights(collapsed, 9 * collapsed[None], np.array([[0, 1, 2]])), 1)
+    assert np.allclose(weights(np.stack([half_turn, bump.vertices]), bump.vertices, bump.triangles), 1 / 9)
+    flat = np.array([[0, 0, 0.0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [2, 2, 0]])
+    triangles = np.array([[0, 1, 2], [1, 3, 2], [0, 3, 4]], dtype=np.int32)  # the last has no area
+    stretched = 1 / (1 + 2**2 + (np.sqrt(3) - 1) ** 2)  # normals grow with the root of the area
+    assert np.allclose(weights(flat[None] * [1, 3, 1], flat, triangles), [stretched, stretched, 1])
 
 
 def test_a_crumpled_spot_bends_its_surroundings_less(bump: TriangleMesh) -> None:
@@ -266,10 +258,10 @@ def test_a_crumpled_spot_bends_its_surroundings_less(bump: TriangleMesh) -> None
     target = other_face(bump)
     far = np.hypot(x - 0.1, y + 0.1) > 0.7
     moved = []
-    for weights in (None, triangle_weights(bump.vertices, shape[None], bump.triangles)):
-        motion = np.linalg.norm(shape - bump.vertices, axis=1)
-        transfer = DeformationTransfer(bump.vertices, target, bump.triangles, motion, parameters=PLAIN, weights=weights)
-        moved.append(np.sqrt(np.mean((transfer.solve(shape[None])[0] - target)[far] ** 2)))
+    for robust in (False, True):
+        moves, parameters = shape[None] - bump.vertices, replace(PLAIN, robust=robust)
+        transfer = DeformationTransfer(bump.vertices, target, bump.triangles, moves, parameters=parameters)
+        moved.append(np.sqrt(np.mean((transfer.solve()[0] - target)[far] ** 2)))
     assert moved[1] < 0.9 * moved[0]
 
 

@@ -44,6 +44,12 @@ class ContactPairs:
     closes: NDArray[np.bool_]
     corners: Ids
 
+    @classmethod
+    def none(cls) -> ContactPairs:
+        """No pairs at all."""
+        ids = np.zeros(0, dtype=np.int64)
+        return cls(ids, ids.reshape(0, 2), np.zeros(0), np.zeros(0, dtype=bool), ids.reshape(0, 2))
+
     def __len__(self) -> int:
         return len(self.vertex)
 
@@ -86,8 +92,7 @@ def find_contacts(openings: Sequence[Opening], reference: Array, frames: NDArray
             if len(inner):
                 parts.append(_nearest_across(everything, inner, other, corners))
     if not parts:
-        none = np.zeros(0, dtype=np.int64)
-        return ContactPairs(none, none.reshape(0, 2), np.zeros(0), np.zeros(0, dtype=bool), none.reshape(0, 2))
+        return ContactPairs.none()
     joined = [np.concatenate(column) for column in zip(*parts, strict=True)]
     return _with_closing(
         ContactPairs(joined[0], joined[1], joined[2], np.zeros(len(joined[0]), bool), joined[3]), everything

@@ -1,6 +1,6 @@
 """Compiled loops over triangles for the transfer of deformation gradients (Sumner and Popovic 2004).
 
-``E = [e0 e1 n]`` are a triangle's edges from its first corner and ``n = e0 x e1 / sqrt(|e0 x e1|)``. Changes of shapes
+``E = [e0 e1 n]`` are a triangle's edges from its first corner and ``n = e0 x e1 / sqrt(|e0 x e1|)``. Moves of shapes
 are ``(V, 3, K)``, the shapes innermost, so that the compiler vectorises over them.
 """
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.compiled import ARITHMETIC, LOOPS, njit
 
-__all__ = ["add_pulls", "invert_edge_frames", "largest_changes"]
+__all__ = ["add_pulls", "invert_edge_frames"]
 
 
 @njit(**LOOPS)
@@ -43,57 +43,24 @@ def _edges(vertices, triangles, f):
     return e, g, e[1] * g[2] - e[2] * g[1], e[2] * g[0] - e[0] * g[2], e[0] * g[1] - e[1] * g[0]
 
 
-@njit(**ARITHMETIC)
-def _frame_changes(rest, changes, triangles, f, out):
-    """How the triangle's ``E`` changes in every shape, ``out`` (3, 3, K), its columns first."""
-    a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
-    e, g, x, y, z = _edges(rest, triangles, f)
-    scale = 1 / np.sqrt(np.sqrt(max(x * x + y * y + z * z, 1e-300)))
-    nx, ny, nz = x * scale, y * scale, z * scale
-    for k in range(changes.shape[2]):
-        x, y, z = changes[a, 0, k], changes[a, 1, k], changes[a, 2, k]
-        u, v, w = changes[b, 0, k] - x, changes[b, 1, k] - y, changes[b, 2, k] - z
-        p, q, r = changes[c, 0, k] - x, changes[c, 1, k] - y, changes[c, 2, k] - z
-        out[0, 0, k], out[0, 1, k], out[0, 2, k] = u, v, w
-        out[1, 0, k], out[1, 1, k], out[1, 2, k] = p, q, r
-        u, v, w, p, q, r = u + e[0], v + e[1], w + e[2], p + g[0], q + g[1], r + g[2]
-        x, y, z = v * r - w * q, w * p - u * r, u * q - v * p
-        scale = 1 / np.sqrt(np.sqrt(max(x * x + y * y + z * z, 1e-300)))
-        out[2, 0, k], out[2, 1, k], out[2, 2, k] = x * scale - nx, y * scale - ny, z * scale - nz
-
-
 @njit(**LOOPS)
-def largest_changes(rest, inverse, changes, triangles, out):
-    """``out`` (F,): the largest ``|J - I|^2`` of the shapes, Frobenius norm, ``J`` the deformation gradient."""
-    frame = np.empty((3, 3, changes.shape[2]))
-    for f in range(len(triangles)):
-        _frame_changes(rest, changes, triangles, f, frame)
-        out[f] = _largest(frame, inverse[f])
-
-
-@njit(**ARITHMETIC)
-def _largest(frame, inverse):
-    largest = 0.0
-    for k in range(frame.shape[2]):
-        total = 0.0
-        for i in range(3):
-            for j in range(3):
-                entry = frame[0, i, k] * inverse[0, j] + frame[1, i, k] * inverse[1, j] + frame[2, i, k] * inverse[2, j]
-                total += entry * entry
-        largest = max(largest, total)
-    return largest
-
-
-@njit(**LOOPS)
-def add_pulls(rest, inverse, changes, triangles, gradients, weights, out):
+def add_pulls(rest, inverse, moves, triangles, gradients, robust, weights, out):
     """``out[i] += w_f (J_f - I) g_i`` for every corner i of every triangle, ``out`` (V, 3, K).
 
-    ``gradients`` (F, 3, 3): its first two rows are ``g`` of the second and the third corner; all three sum to zero.
+    ``J`` is the deformation gradient. ``weights`` (F,) are set: 1, or where ``robust`` ``1 / (1 + q_f^2)``, ``q_f`` the
+    largest ``|J_f - I|`` of the shapes, Frobenius norm. ``gradients`` (F, 3, 3): its first two rows are ``g`` of the
+    second and the third corner; all three sum to zero.
     """
-    frame = np.empty((3, 3, changes.shape[2]))
-    share = np.empty((2, 3))
+    n_shapes = moves.shape[2]
+    frame, squared, share = np.empty((3, 3, n_shapes)), np.empty(n_shapes), np.empty((2, 3))
     for f in range(len(triangles)):
-        _frame_changes(rest, changes, triangles, f, frame)
+        _frame_changes(rest, moves, triangles, f, frame)
+        largest = 0.0
+        if robust:
+            _squared_changes(frame, inverse[f], squared)
+            for k in range(n_shapes):
+                largest = max(largest, squared[k])
+        weights[f] = 1 / (1 + largest)
         for corner in range(2):
             for m in range(3):
                 share[corner, m] = weights[f] * (
@@ -102,6 +69,37 @@ def add_pulls(rest, inverse, changes, triangles, gradients, weights, out):
                     + inverse[f, m, 2] * gradients[f, corner, 2]
                 )
         _scatter(frame, share, triangles[f, 0], triangles[f, 1], triangles[f, 2], out)
+
+
+@njit(**ARITHMETIC)
+def _frame_changes(rest, moves, triangles, f, out):
+    """How the triangle's ``E`` changes in every shape, ``out`` (3, 3, K), its columns first."""
+    a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
+    e, g, x, y, z = _edges(rest, triangles, f)
+    scale = 1 / np.sqrt(np.sqrt(max(x * x + y * y + z * z, 1e-300)))
+    nx, ny, nz = x * scale, y * scale, z * scale
+    for k in range(moves.shape[2]):
+        x, y, z = moves[a, 0, k], moves[a, 1, k], moves[a, 2, k]
+        u, v, w = moves[b, 0, k] - x, moves[b, 1, k] - y, moves[b, 2, k] - z
+        p, q, r = moves[c, 0, k] - x, moves[c, 1, k] - y, moves[c, 2, k] - z
+        out[0, 0, k], out[0, 1, k], out[0, 2, k] = u, v, w
+        out[1, 0, k], out[1, 1, k], out[1, 2, k] = p, q, r
+        u, v, w, p, q, r = u + e[0], v + e[1], w + e[2], p + g[0], q + g[1], r + g[2]
+        x, y, z = v * r - w * q, w * p - u * r, u * q - v * p
+        scale = 1 / np.sqrt(np.sqrt(max(x * x + y * y + z * z, 1e-300)))
+        out[2, 0, k], out[2, 1, k], out[2, 2, k] = x * scale - nx, y * scale - ny, z * scale - nz
+
+
+@njit(**ARITHMETIC)
+def _squared_changes(frame, inverse, out):
+    """``|J - I|^2`` of every shape, ``out`` (K,)."""
+    for k in range(len(out)):
+        total = 0.0
+        for i in range(3):
+            for j in range(3):
+                entry = frame[0, i, k] * inverse[0, j] + frame[1, i, k] * inverse[1, j] + frame[2, i, k] * inverse[2, j]
+                total += entry * entry
+        out[k] = total
 
 
 @njit(**ARITHMETIC)

@@ -7,7 +7,7 @@ from toolkit.mesh import TriangleMesh
 from toolkit.pose_edit import EditableTake
 from toolkit.transfer import DeformationTransfer, TransferParameters
 
-PLAIN = TransferParameters(feature_lines=False, contacts=False)
+PLAIN = TransferParameters(feature_lines=False, contacts=False, robust=False)
 
 
 def make_take(mesh: TriangleMesh, n_frames: int = 60) -> EditableTake:
@@ -27,8 +27,7 @@ def make_take(mesh: TriangleMesh, n_frames: int = 60) -> EditableTake:
     weights = np.stack(curves, axis=1)
     weights[weights < 1e-3] = 0
     rest = mesh.vertices
-    motion = np.sqrt((moves**2).sum(axis=2)).max(axis=0)
-    system = DeformationTransfer(rest, rest, mesh.triangles, motion, parameters=PLAIN)
+    system = DeformationTransfer(rest, rest, mesh.triangles, moves, parameters=PLAIN)
     return EditableTake(rest, moves, weights, system)
 
 

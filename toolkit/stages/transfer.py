@@ -22,7 +22,7 @@ from toolkit.solve import Factor, factorise
 from toolkit.stages.bases import load_pairs
 from toolkit.stages.inputs import load_lines, load_mesh
 from toolkit.stages.register import load_target
-from toolkit.transfer import DeformationTransfer, largest_motion, triangle_weights
+from toolkit.transfer import DeformationTransfer
 
 __all__ = ["SavedSystem", "open_system", "target_decomposer", "work"]
 
@@ -33,16 +33,14 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     """Factorise once, solve for all bases."""
     target = target_decomposer(shot)
     frames = np.array(shot.array("bases", "frames"))
-    details = shot.array("decompose", "details")
-    shapes = _shapes(shot)
+    moves, details = (shot.array("decompose", name)[frames] for name in ("smooth_deltas", "details"))
     progress("factorising", 0, 1)
-    system = _system(shot, target, shapes)
+    system = _system(shot, target, moves)
     progress("factorising", 1, 1)
-    source, pairs = load_mesh(shot, "source"), load_pairs(shot)
     gain = detail_gain(shot.config.details, system.source, target)
     gaps = np.array(shot.array("bases", "pair_gaps"))[1:][frames]
-    contact_map = ContactMap(pairs, source.vertices, target.mesh.vertices)
-    bases = transfer_bases(system, target, shapes, details[frames], gain, pairs, contact_map, gaps, progress)
+    contact_map = ContactMap(load_pairs(shot), load_mesh(shot, "source").vertices, target.mesh.vertices)
+    bases = transfer_bases(system, target, moves, details, gain, contact_map, gaps, progress)
     folder.save("bases", bases)
     folder.save("rest", target.rest.smooth)
     folder.save("gain", gain)
@@ -51,7 +49,7 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     folder.numbers |= {
         "bases": len(bases),
         "feature_line_edges": len(line_edges(load_lines(shot))) if shot.config.transfer.feature_lines else 0,
-        "contact_pairs": len(pairs) if shot.config.transfer.contacts else 0,
+        "contact_pairs": len(system.pairs),
     }
 
 
@@ -86,22 +84,13 @@ def _decomposed(mesh: TriangleMesh, parameters: SmoothingParameters, neighbour: 
     return Decomposer(mesh, parameters, neighbour)
 
 
-def _shapes(shot: Shot) -> np.ndarray:
-    """The source's smoothed shapes in the frames that are bases, ``(K, V, 3)``."""
-    smooth, frames = np.array(shot.array("decompose", "rest_smooth")), np.array(shot.array("bases", "frames"))
-    return np.asarray(smooth + shot.array("decompose", "smooth_deltas")[frames])
-
-
-def _system(shot: Shot, target: Decomposer, shapes: np.ndarray) -> DeformationTransfer:
-    smooth, triangles = np.array(shot.array("decompose", "rest_smooth")), target.mesh.triangles
-    weights = triangle_weights(smooth, shapes, triangles) if shot.config.transfer.robust else None
+def _system(shot: Shot, target: Decomposer, moves: np.ndarray) -> DeformationTransfer:
     return DeformationTransfer(
-        smooth,
+        np.array(shot.array("decompose", "rest_smooth")),
         target.rest.smooth,
-        triangles,
-        largest_motion(smooth, shapes),
+        target.mesh.triangles,
+        moves,
         line_edges(load_lines(shot)),
         load_pairs(shot),
         shot.config.transfer,
-        weights,
     )
