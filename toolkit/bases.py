@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.blocks import map_blocks, scratch
-from toolkit.compiled import njit
+from toolkit.compiled import ARITHMETIC, njit
 from toolkit.errors import InputError
 from toolkit.progress import Progress, silent
 from toolkit.steadying import steady_weights
@@ -191,12 +191,25 @@ def _best_candidate(
 
 def _explained(gram: Array, frames: list[int], weights: Array) -> Array:
     """For each frame, how much of the residuals it would explain alone: ``sum_t max(0, r_t . r_c)^2 / |r_c|^2``."""
-    coupling = weights @ gram[frames]  # (T, T): w_t . G_B
-    residual = gram - coupling - coupling.T + weights @ gram[np.ix_(frames, frames)] @ weights.T
-    own = np.diag(residual).copy()
+    inner = gram[np.ix_(frames, frames)]
+    half = gram[frames] - 0.5 * inner @ weights.T
+    # What the bases explain of the products of frames, W H + (W H)^T, (T, T).
+    reached = np.concatenate([weights, half.T], axis=1) @ np.concatenate([half, weights.T])
+    explained = np.zeros(len(gram))
+    _add_positive_squares(gram, reached, explained)
+    own = np.diag(gram) - np.diag(reached)
     floor = 1e-9 * max(float(np.diag(gram).max()), 1e-300)
-    gains = (np.maximum(residual, 0) ** 2).sum(axis=0) / np.maximum(own, floor)
-    return np.where(own > floor, gains, 0.0)
+    return np.where(own > floor, explained / np.maximum(own, floor), 0.0)
+
+
+@njit(**ARITHMETIC)
+def _add_positive_squares(gram, reached, sums):  # type: ignore[no-untyped-def]  # compiled
+    """``sums[c] += sum_t max(0, gram[t, c] - reached[t, c])^2``: one pass, where whole arrays would take six."""
+    for t in range(len(gram)):
+        row, known = gram[t], reached[t]
+        for c in range(len(sums)):
+            left = max(row[c] - known[c], 0.0)
+            sums[c] += left * left
 
 
 def _squared_errors(gram: Array, frames: NDArray[np.int64], weights: Array, *, exact: bool = True) -> Array:

@@ -72,7 +72,7 @@ def _contacts(
     points = np.empty((sequence.n_frames, len(ids), 3))
     for start, stop in sequence.blocks():
         points[start:stop] = sequence.read(start, stop, ids)
-    points = np.einsum("tji,tnj->tni", motion.rotations, points - motion.translations[:, None])
+    points = (points - motion.translations[:, None]) @ motion.rotations
     compact = [Opening(o.name, np.searchsorted(ids, o.upper), np.searchsorted(ids, o.lower)) for o in openings]
     step = -(-sequence.n_frames // _PAIRING_FRAMES)
     pairs = find_contacts(compact, rest[ids], points[::step])
