@@ -9,7 +9,7 @@ import numpy as np
 
 from toolkit.export.performance import Performance
 from toolkit.meshio.aside import written_aside
-from toolkit.meshio.joined import polygons_of, reverse_faces
+from toolkit.meshio.joined import reverse_faces
 from toolkit.meshio.optional import require
 from toolkit.progress import Progress
 
@@ -22,7 +22,7 @@ def write_alembic(performance: Performance, path: Path, progress: Progress) -> N
     import imath
     from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 
-    polygons = polygons_of(performance.mesh)
+    polygons = performance.mesh.faces
     corners = np.ascontiguousarray(reverse_faces(polygons.counts, polygons.indices), dtype=np.int32)
     counts = np.ascontiguousarray(polygons.counts, dtype=np.int32)
     with written_aside(path, room=performance.n_bytes) as temporary:

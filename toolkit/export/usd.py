@@ -9,7 +9,6 @@ import numpy as np
 
 from toolkit.export.performance import Performance
 from toolkit.meshio.aside import written_aside
-from toolkit.meshio.joined import polygons_of
 from toolkit.meshio.optional import require
 from toolkit.progress import Progress
 
@@ -54,7 +53,7 @@ def _define_mesh(stage: Any, performance: Performance) -> Any:
     root = UsdGeom.Xform.Define(stage, f"/{Tf.MakeValidIdentifier(performance.name)}")
     stage.SetDefaultPrim(root.GetPrim())
     mesh = UsdGeom.Mesh.Define(stage, root.GetPath().AppendChild("mesh"))
-    polygons = polygons_of(performance.mesh)
+    polygons = performance.mesh.faces
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(polygons.counts.astype(np.int32)))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(polygons.indices.astype(np.int32)))
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)

@@ -57,6 +57,13 @@ class TriangleMesh:
         return len(self.triangles)
 
     @property
+    def faces(self) -> Polygons:
+        """The faces as they are to be written: the file's own polygons, or the triangles."""
+        if self.polygons is not None:
+            return self.polygons
+        return Polygons(np.full(self.n_triangles, 3, dtype=np.int32), self.triangles.ravel())
+
+    @property
     def diagonal(self) -> float:
         """Diagonal of the bounding box, in the mesh's unit."""
         return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.errors import InputError
-from toolkit.mesh import Polygons, TriangleMesh
+from toolkit.mesh import TriangleMesh
 from toolkit.meshio.faces import build_mesh
 
-__all__ = ["Piece", "frame_rate_of", "join_faces", "join_points", "polygons_of", "reverse_faces", "transform_points"]
+__all__ = ["Piece", "frame_rate_of", "join_faces", "join_points", "reverse_faces", "transform_points"]
 
 
 @dataclass(frozen=True)
@@ -64,16 +64,9 @@ def transform_points(points: NDArray[np.floating], row_matrix: NDArray[np.float6
 
 
 def frame_rate_of(times: NDArray[np.float64]) -> float | None:
-    """Return the mean rate of the frame ``times`` (T,) in seconds, to 3 decimals; None for a single frame."""
+    """Return the mean rate of the frame ``times`` (T,) in seconds, to 3 decimals; None where they span nothing."""
     span = float(times[-1] - times[0])
-    return round((len(times) - 1) / span, 3) if span > 0 else None
-
-
-def polygons_of(mesh: TriangleMesh) -> Polygons:
-    """Return the faces as they are to be written: the file's own polygons, or the triangles."""
-    if mesh.polygons is not None:
-        return mesh.polygons
-    return Polygons(np.full(mesh.n_triangles, 3, dtype=np.int32), mesh.triangles.ravel())
+    return round((len(times) - 1) / span, 3) if 0 < span < np.inf else None
 
 
 def _check_piece(piece: Piece, ids: NDArray[np.int64], where: object) -> None:

@@ -90,7 +90,7 @@ def write_ply(path: str | Path, mesh: TriangleMesh) -> None:
 
 def header_bytes(mesh: TriangleMesh, number: str) -> bytes:
     """Return the header for positions of PLY type ``number`` (``float`` or ``double``)."""
-    polygons = _polygons(mesh)
+    polygons = mesh.faces
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {mesh.n_vertices}"]
     lines += [f"property {number} {axis}" for axis in "xyz"]
     lines += [f"element face {len(polygons.counts)}", f"property list {_count_type(polygons)} int vertex_indices"]
@@ -99,7 +99,7 @@ def header_bytes(mesh: TriangleMesh, number: str) -> bytes:
 
 def face_bytes(mesh: TriangleMesh) -> bytes:
     """Return the binary rows of the face element; a sequence makes them once."""
-    polygons = _polygons(mesh)
+    polygons = mesh.faces
     count = np.dtype("<" + _TYPES[_count_type(polygons)])
     row_starts = np.concatenate([[0], np.cumsum(count.itemsize + 4 * polygons.counts.astype(np.int64))])
     rows = np.zeros(row_starts[-1], dtype=np.uint8)
@@ -109,12 +109,6 @@ def face_bytes(mesh: TriangleMesh) -> bytes:
     is_index[count_bytes] = False
     rows[is_index] = polygons.indices.astype("<i4").view(np.uint8)
     return rows.tobytes()
-
-
-def _polygons(mesh: TriangleMesh) -> Polygons:
-    if mesh.polygons is not None:
-        return mesh.polygons
-    return Polygons(np.full(mesh.n_triangles, 3, dtype=np.int32), mesh.triangles.ravel())
 
 
 def _count_type(polygons: Polygons) -> str:

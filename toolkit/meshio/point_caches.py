@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.errors import InputError
+from toolkit.meshio.joined import frame_rate_of
 from toolkit.meshio.sequence import FrameSequence
 
 __all__ = ["MDD_HEADER", "PC2_HEADER", "open_mdd", "open_npy", "open_npz", "open_pc2"]
@@ -58,12 +59,7 @@ def open_mdd(path: Path, fps: float | None) -> FrameSequence:
     if fps is not None:
         return sequence
     times = np.fromfile(path, dtype=">f4", count=n_frames, offset=MDD_HEADER.itemsize).astype(np.float64)
-    return replace(sequence, fps=_rate(times))
-
-
-def _rate(times: NDArray[np.float64]) -> float | None:
-    span = times[-1] - times[0]
-    return float(round((len(times) - 1) / span, 3)) if np.isfinite(span) and span > 0 else None
+    return replace(sequence, fps=frame_rate_of(times))
 
 
 def _header(path: Path, dtype: np.dtype) -> NDArray:

@@ -14,8 +14,10 @@ from toolkit.meshio.aside import written_aside
 from toolkit.meshio.npy import write_blocks
 from toolkit.progress import Progress, silent
 
-__all__ = ["FrameSequence", "cache_as_npy", "checked_fps", "frame_blocks"]
+__all__ = ["USUAL_FPS", "FrameSequence", "cache_as_npy", "checked_fps", "frame_blocks"]
 
+USUAL_FPS = 30.0
+"""Frames a second where neither the file nor the user says."""
 _BLOCK_BYTES = 64 * 2**20
 
 
@@ -42,6 +44,11 @@ class FrameSequence:
                 where=self.where,
                 remedy="export it again, with its animation and its geometry",
             )
+
+    @property
+    def rate(self) -> float:
+        """Frames a second; the usual ones where it is not known."""
+        return float(self.fps or USUAL_FPS)
 
     def __len__(self) -> int:
         return self.n_frames

@@ -84,7 +84,7 @@ def open_views(shot: Shot, *, forward: Vector = (0.0, 0.0, 1.0), up: Vector = (0
         extras=load_extras(shot.config.target.extras, motions[1]),
     )
     heights = (height, height * pose.scale)
-    return ShotViews(performance, retargeted, landmarks, float(sequence.fps or 30.0), heights, motions)
+    return ShotViews(performance, retargeted, landmarks, sequence.rate, heights, motions)
 
 
 def expressive_frames(shot: Shot, count: int) -> list[int]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from toolkit.errors import InputError
 from toolkit.export import Performance
+from toolkit.meshio.sequence import USUAL_FPS
 from toolkit.shot import Shot
 from toolkit.stages.decompose import load_motion
 from toolkit.stages.inputs import load_mesh
@@ -17,8 +18,6 @@ from toolkit.stages.run import current_key
 __all__ = ["load_performance"]
 
 log = logging.getLogger(__name__)
-
-_USUAL_FPS = 30.0
 
 
 def load_performance(shot: Shot) -> Performance:
@@ -42,7 +41,7 @@ def load_performance(shot: Shot) -> Performance:
     placed = shapes.astype(np.float64) - motion.translations[chosen][:, None]
     fps = (shot.manifest("inputs") or {}).get("numbers", {}).get("fps")
     if fps is None:
-        log.warning("the take says no frame rate; %g frames a second are assumed (fps in shot.toml)", _USUAL_FPS)
+        log.warning("the take says no frame rate; %g frames a second are assumed (fps in shot.toml)", USUAL_FPS)
     return Performance(
         triangles=source.triangles,
         polygons=source.polygons,
@@ -53,7 +52,7 @@ def load_performance(shot: Shot) -> Performance:
         translations=motion.translations,
         read=lambda start, stop: np.array(frames[start:stop]),
         n_frames=len(frames),
-        fps=float(fps or _USUAL_FPS),
+        fps=float(fps or USUAL_FPS),
         name=shot.path.resolve().name,
         morph_names=tuple(f"frame_{index:04d}" for index in chosen),
     )

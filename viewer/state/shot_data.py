@@ -26,8 +26,6 @@ __all__ = ["ShotData"]
 
 log = logging.getLogger(__name__)
 
-_USUAL_FPS = 30.0
-
 
 class ShotData:
     """Reads a shot folder. Arrays are memory-mapped; nothing of it is changed here.
@@ -69,7 +67,7 @@ class ShotData:
     @property
     def fps(self) -> float:
         """Frames a second; 30 where the take does not say."""
-        return float(self.sequence.fps or _USUAL_FPS)
+        return self.sequence.rate
 
     def source_frame(self, frame: int) -> NDArray[np.float32]:
         """One frame of the take ``(V, 3)``."""
