@@ -72,3 +72,50 @@ def test_what_was_there_is_removed_meanwhile(tmp_path: Path) -> None:
         if thread.name == "remove":
             thread.join(30)
     assert [path.name for path in tmp_path.iterdir()] == ["stage"]
+
+
+def test_two_that_replace_a_folder_at_once_both_come_through(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(aside, "_flush_to_disk", lambda file: None)
+    start = threading.Barrier(2)
+    went_wrong: list[BaseException] = []
+
+    def replace_often(content: bytes) -> None:
+        try:
+            start.wait(30)
+            for _ in range(40):
+                with folder_aside(tmp_path / "stage") as folder:
+                    (folder / "a").write_bytes(content)
+        except BaseException as error:
+            went_wrong.append(error)
+
+    both = [threading.Thread(target=replace_often, args=(content,)) for content in (b"one", b"two")]
+    for thread in both:
+        thread.start()
+    for thread in both:
+        thread.join(60)
+    assert went_wrong == []
+    assert (tmp_path / "stage" / "a").read_bytes() in (b"one", b"two")
+    for thread in threading.enumerate():
+        if thread.name == "remove":
+            thread.join(30)
+    assert [path.name for path in tmp_path.iterdir()] == ["stage"]
+
+
+def test_what_was_there_comes_back_where_the_new_cannot_take_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "stage").mkdir()
+    (tmp_path / "stage" / "a").write_bytes(b"old")
+    rename, calls = aside.os.rename, []
+
+    def fail_at_the_third(one: Path, other: Path) -> None:
+        calls.append(other)
+        if len(calls) == 3:
+            raise OSError(errno.EIO, "Input/output error", str(other))
+        rename(one, other)
+
+    monkeypatch.setattr(aside.os, "rename", fail_at_the_third)
+    with pytest.raises(OSError, match="Input/output"), folder_aside(tmp_path / "stage") as folder:
+        (folder / "a").write_bytes(b"new")
+    assert [path.name for path in tmp_path.iterdir()] == ["stage"]
+    assert (tmp_path / "stage" / "a").read_bytes() == b"old"

@@ -16,6 +16,7 @@ from toolkit.meshio.leftovers import temporary_name
 __all__ = ["folder_aside", "written_aside"]
 
 _FLUSH_SECONDS = 0.25
+_THERE_ALREADY = (errno.ENOTEMPTY, errno.EEXIST)
 
 
 @contextmanager
@@ -59,19 +60,33 @@ def folder_aside(path: str | Path) -> Iterator[Path]:
 
 
 def _replace_folder(new: Path, path: Path) -> None:
-    """Rename ``new`` to ``path``; a folder in use cannot be overwritten in one step, so the old one steps aside."""
-    if not path.exists():
-        os.rename(new, path)
-        return
-    old = temporary_name(path)
-    os.rename(path, old)
-    try:
-        os.rename(new, path)
-    except BaseException:
-        os.rename(old, path)
-        raise
-    # Nobody waits for it but the end of the process: some systems take half a second to give up half a gigabyte.
-    threading.Thread(target=shutil.rmtree, args=(old,), kwargs={"ignore_errors": True}, name="remove").start()
+    """Rename ``new`` to ``path``; a folder in use cannot be overwritten in one step, so the old one steps aside.
+
+    Another process may do the same at the same time: whoever comes last stays.
+    """
+    old: Path | None = None
+    while True:
+        try:
+            os.rename(new, path)
+            break
+        except OSError as error:
+            if error.errno not in _THERE_ALREADY:
+                if old is not None:
+                    os.rename(old, path)
+                raise
+        _remove_meanwhile(old)
+        old = temporary_name(path)
+        try:
+            os.rename(path, old)
+        except FileNotFoundError:
+            old = None
+    _remove_meanwhile(old)
+
+
+def _remove_meanwhile(folder: Path | None) -> None:
+    """Nobody waits for it but the end of the process: some systems take half a second to give up half a gigabyte."""
+    if folder is not None:
+        threading.Thread(target=shutil.rmtree, args=(folder,), kwargs={"ignore_errors": True}, name="remove").start()
 
 
 @contextmanager
