@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,7 +62,7 @@ def add_pose_options(parser: argparse.ArgumentParser) -> None:
     spread.add_argument("--mode", choices=["both", "bases", "weights"], help="what may change (both)")
     spread.add_argument("--window", type=frames_range, metavar="A:B", help="first and last frame that may change (all)")
     for name in _NUMBERS:
-        spread.add_argument(f"--{name.replace('_', '-')}", type=float, metavar="X", help=_HELP[name])
+        spread.add_argument(f"--{name.replace('_', '-')}", type=finite_number, metavar="X", help=_HELP[name])
 
 
 def pose_of(options: argparse.Namespace, session: EditSession) -> dict[str, Any] | None:
@@ -101,6 +102,13 @@ def frames_range(text: str) -> tuple[int, int]:
     return first, last
 
 
+def finite_number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
+
+
 def _offset(text: str) -> dict[str, Any]:
     vertex, values = _vertex_and_vector(text)
     return {"kind": "point", "vertex": vertex, "offset": values}
@@ -114,7 +122,7 @@ def _place(text: str) -> dict[str, Any]:
 def _vertex_and_vector(text: str) -> tuple[int, list[float]]:
     try:
         vertex, _, rest = text.partition("=")
-        x, y, z = (float(part) for part in rest.split(","))
+        x, y, z = (finite_number(part) for part in rest.split(","))
         return int(vertex), [x, y, z]
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a vertex and three numbers such as 4711=0,0.3,0") from None
@@ -124,7 +132,7 @@ def _distance(text: str) -> dict[str, Any]:
     try:
         pair, _, much = text.partition("=")
         a, b = (int(part) for part in pair.split(","))
-        name, value = ("factor", float(much[1:])) if much.startswith("x") else ("length", float(much))
+        name, value = ("factor", finite_number(much[1:])) if much.startswith("x") else ("length", finite_number(much))
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not two vertices and a length such as 12,40=x1.2") from None
     return {"kind": "distance", "vertices": [a, b], name: value}
@@ -138,7 +146,10 @@ def vertex_ids(text: str) -> list[int]:
         values = json.loads(content) if content.lstrip().startswith("[") else content.replace(",", " ").split()
         return [int(value) for value in values]
     except (ValueError, TypeError):
-        raise InputError(f"{text!r} is neither a list of vertex ids nor a file of them") from None
+        raise InputError(
+            f"{text!r} is neither a list of vertex ids nor a file of them",
+            remedy="give ids such as 12,57 or the path of a file with them",
+        ) from None
 
 
 def length_of(text: str, session: EditSession) -> float:

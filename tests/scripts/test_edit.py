@@ -211,7 +211,9 @@ def test_bad_input_leaves_no_edit(shot: Path, arguments: list[str], sentence: st
 
 
 def test_bad_usage_is_exit_code_2(tmp_path: Path, edit: Edit) -> None:
-    for arguments in (["add", "--point", "3=0,0,1"], ["add", "--frame", "3", "--point", "3=0,0"], ["fly"], []):
+    at = ["add", "--frame", "3"]
+    not_numbers = [[*at, "--point", "3=0,nan,1"], [*at, "--distance", "3,4=xinf"], [*at, "--lambda-e", "nan"]]
+    for arguments in (["add", "--point", "3=0,0,1"], [*at, "--point", "3=0,0"], ["fly"], [], *not_numbers):
         with pytest.raises(SystemExit, match="2"):
             edit(tmp_path, *arguments)
     done = script(tmp_path, "list")
