@@ -38,11 +38,10 @@ def longest_in_plane(vertices, starts, edges):
 
     ``vertices`` (V, 3) float64; ``starts`` and ``edges`` are the mesh's `opposite_edges`. A lone vertex has itself.
     """
-    points, normal = vertices.reshape(-1, 3, 1), np.empty((3, 1))
+    points = vertices.reshape(-1, 3, 1)
     longest = np.arange(len(vertices))
     for v in range(len(vertices)):
-        _sum_normals(points, starts, edges, v, normal)
-        nx, ny, nz = _unit(normal[0, 0], normal[1, 0], normal[2, 0])
+        nx, ny, nz = _unit(*_sum_normal(points, starts, edges, v))
         best = -np.inf
         for e in range(starts[v], starts[v + 1]):
             for w in edges[e]:
@@ -57,9 +56,17 @@ def longest_in_plane(vertices, starts, edges):
     return longest
 
 
-@njit(**ARITHMETIC)
+@njit(forceinline=True, **LOOPS)
 def _sum_normals(points, starts, edges, v, normal):
     """Area-weighted normal (not normalised) of vertex ``v`` in every frame, to ``normal`` (3, B)."""
+    if points.shape[2] == 1:  # what is displayed: numbers by themselves take half the time
+        normal[0, 0], normal[1, 0], normal[2, 0] = _sum_normal(points, starts, edges, v)
+    else:
+        _sum_in_frames(points, starts, edges, v, normal)
+
+
+@njit(**ARITHMETIC)
+def _sum_in_frames(points, starts, edges, v, normal):
     normal[:] = 0
     for e in range(starts[v], starts[v + 1]):
         i, j = edges[e, 0], edges[e, 1]
@@ -70,6 +77,21 @@ def _sum_normals(points, starts, edges, v, normal):
             normal[0, t] += uy * vz - uz * vy
             normal[1, t] += uz * vx - ux * vz
             normal[2, t] += ux * vy - uy * vx
+
+
+@njit(forceinline=True, **LOOPS)
+def _sum_normal(points, starts, edges, v):
+    """The same in the first frame: three numbers."""
+    px, py, pz = points[v, 0, 0], points[v, 1, 0], points[v, 2, 0]
+    x = y = z = points.dtype.type(0)
+    for e in range(starts[v], starts[v + 1]):
+        i, j = edges[e, 0], edges[e, 1]
+        ux, uy, uz = points[i, 0, 0] - px, points[i, 1, 0] - py, points[i, 2, 0] - pz
+        vx, vy, vz = points[j, 0, 0] - px, points[j, 1, 0] - py, points[j, 2, 0] - pz
+        x += uy * vz - uz * vy
+        y += uz * vx - ux * vz
+        z += ux * vy - uy * vx
+    return x, y, z
 
 
 @njit(forceinline=True, **LOOPS)
