@@ -10,7 +10,19 @@ import numpy as np
 
 from toolkit.compiled import ARITHMETIC, LOOPS, njit
 
-__all__ = ["add_pulls", "invert_edge_frames"]
+__all__ = ["add_pulls", "add_side_products", "invert_edge_frames", "put_shapes_innermost"]
+
+
+@njit(**LOOPS)
+def put_shapes_innermost(moves, out, squared):
+    """``out`` (V, 3, K) of ``moves`` (K, V, 3), and ``squared`` (V,) of the largest of each vertex."""
+    for v in range(len(out)):
+        largest = 0.0
+        for k in range(len(moves)):
+            x, y, z = np.float64(moves[k, v, 0]), np.float64(moves[k, v, 1]), np.float64(moves[k, v, 2])
+            out[v, 0, k], out[v, 1, k], out[v, 2, k] = x, y, z
+            largest = max(largest, x * x + y * y + z * z)
+        squared[v] = largest
 
 
 @njit(**LOOPS)
@@ -69,6 +81,25 @@ def add_pulls(rest, inverse, moves, triangles, gradients, robust, weights, out):
                     + inverse[f, m, 2] * gradients[f, corner, 2]
                 )
         _scatter(frame, share, triangles[f, 0], triangles[f, 1], triangles[f, 2], out)
+
+
+@njit(**LOOPS)
+def add_side_products(gradients, weights, triangles, starts, ends, out):
+    """``out[i, j] += w_f g_i . g_j`` for the sides of every triangle, ``gradients`` as for `add_pulls`.
+
+    ``out`` are the numbers of a sparse matrix with these ``ends`` from ``starts[i]`` on in its row i, ``i < j``.
+    """
+    for f in range(len(triangles)):
+        g, h, w = gradients[f, 0], gradients[f, 1], weights[f]
+        gg = w * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+        gh = w * (g[0] * h[0] + g[1] * h[1] + g[2] * h[2])
+        hh = w * (h[0] * h[0] + h[1] * h[1] + h[2] * h[2])
+        a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
+        for i, j, product in ((a, b, -gg - gh), (b, c, gh), (c, a, -gh - hh)):
+            e = starts[min(i, j)]
+            while ends[e] != max(i, j):
+                e += 1
+            out[e] += product
 
 
 @njit(**ARITHMETIC)

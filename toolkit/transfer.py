@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from toolkit.contacts import ContactPairs
 from toolkit.errors import InputError
-from toolkit.gradient_kernels import add_pulls, invert_edge_frames
-from toolkit.mesh.topology import connected_components, directed_edges
+from toolkit.gradient_kernels import add_pulls, add_side_products, invert_edge_frames, put_shapes_innermost
+from toolkit.mesh.topology import connected_components, edge_matrix, unique_edges
 from toolkit.solve import Factor, factorise
 
 __all__ = [
@@ -155,7 +155,8 @@ class DeformationTransfer:
         after = before + (moved[edges[:, 1]] - moved[edges[:, 0]]).transpose(2, 0, 1)
         goals = scale * (line_gradients(before, after, direction) - direction).transpose(1, 2, 0)
         rows = _difference_rows(edges, scale / length, len(self.target))
-        self.right += (rows.T @ _flat(goals)).reshape(self.right.shape)
+        ids = np.unique(edges)
+        self.right[ids] += (rows[:, ids].T @ _flat(goals)).reshape(-1, *goals.shape[1:])
         return rows
 
 
@@ -164,9 +165,10 @@ def _shapes_innermost(moves: NDArray[np.floating]) -> tuple[Array, Array]:
 
     The bases tell it: all frames are sums of them, and what no basis moves no frame of the target moves.
     """
-    innermost = np.ascontiguousarray(moves.transpose(1, 2, 0), dtype=np.float64)
-    squared = np.einsum("vck,vck->vk", innermost, innermost)
-    return innermost, np.sqrt(squared.max(axis=1, initial=0))
+    n_vertices = moves.shape[1]
+    innermost, squared = np.empty((n_vertices, 3, len(moves))), np.empty(n_vertices)
+    put_shapes_innermost(np.ascontiguousarray(moves), innermost, squared)
+    return innermost, np.sqrt(squared)
 
 
 def _flat(values: Array) -> Array:
@@ -190,10 +192,9 @@ def _normal_matrix(
     A triangle's part is ``w_f g_i . g_j`` at both ends of each of its sides; constants have no gradient, so the rows
     of these parts sum to zero.
     """
-    g, h = gradients[:, 0], gradients[:, 1]
-    gg, gh, hh = (weights * np.einsum("fi,fi->f", one, other) for one, other in ((g, g), (g, h), (h, h)))
-    ends = np.sort(directed_edges(triangles), axis=1).T
-    half = sp.csr_matrix((np.concatenate([-gg - gh, gh, -gh - hh]), ends), shape=(len(hold), len(hold)))
+    edges = unique_edges(triangles)
+    half = edge_matrix(edges, np.zeros(len(edges)), len(hold))
+    add_side_products(gradients, weights, triangles, half.indptr, half.indices, half.data)
     ones = np.ones(len(hold))
     few = sp.diags(hold - half @ ones - half.T @ ones) + rows.T @ rows
     # A symmetric matrix by rows is the same by columns.

@@ -16,6 +16,7 @@ __all__ = [
     "directed_edges",
     "edge_components",
     "edge_counts",
+    "edge_matrix",
     "unique_edges",
     "vertex_adjacency",
 ]
@@ -66,11 +67,15 @@ def connected_components(triangles: NDArray[np.integer], n_vertices: int) -> tup
 
 def edge_components(edges: NDArray[np.integer], n_vertices: int) -> tuple[int, NDArray[np.int32]]:
     """As `connected_components`, for edges ``(E, 2)`` that are sorted, each once, lower id first."""
-    # Such edges are the rows of a sparse matrix as they are; some releases of SciPy take contiguous arrays only.
-    starts, ends = np.searchsorted(edges[:, 0], np.arange(n_vertices + 1)), np.ascontiguousarray(edges[:, 1])
-    graph = sp.csr_matrix((np.ones(len(edges), np.int8), ends, starts), shape=(n_vertices, n_vertices))
-    count, labels = _components(graph, directed=False)
+    count, labels = _components(edge_matrix(edges, np.ones(len(edges), np.int8), n_vertices), directed=False)
     return int(count), labels
+
+
+def edge_matrix(edges: NDArray[np.integer], values: NDArray, n_vertices: int) -> sp.csr_matrix:
+    """Half a matrix ``(V, V)``: values ``(E,)`` of edges ``(E, 2)`` that are sorted, each once, lower id first."""
+    # Such edges are rows as they are; some releases of SciPy take contiguous arrays only.
+    starts, ends = np.searchsorted(edges[:, 0], np.arange(n_vertices + 1)), np.ascontiguousarray(edges[:, 1])
+    return sp.csr_matrix((values, ends, starts), shape=(n_vertices, n_vertices))
 
 
 @remembered
