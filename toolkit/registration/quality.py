@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.mesh import TriangleMesh, face_normals, triangle_areas, vertex_normals
+from toolkit.mesh import TriangleMesh, triangle_areas
+from toolkit.registration.folds import agreement, backwards
 from toolkit.registration.nonrigid import SheetedSurface
 from toolkit.registration.surface import Hits
 
@@ -18,8 +19,6 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _STRETCHED = 6.0
-_FLAT = 0.9
-"""Mean length of the target's normals under a triangle from which on they say which side is out."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +56,8 @@ def flipped_triangles(source: TriangleMesh, vertices: Array, hits: Hits, skin: M
     triangles = source.triangles
     areas = triangle_areas(source.vertices, triangles)
     candidates = skin[triangles].all(axis=1) & (areas > 1e-4 * np.median(areas))
-    normals = face_normals(vertices, triangles)
-    folded = (_agreement(vertices, triangles) < 0) & (_agreement(source.vertices, triangles) > 0)
-    outside = hits.normals[triangles].mean(axis=1)
-    flat = np.linalg.norm(outside, axis=1) > _FLAT
-    backwards = flat & (np.einsum("fd,fd->f", normals, outside) < 0)
-    return candidates & (folded | backwards)
+    folded = (agreement(vertices, triangles) < 0) & (agreement(source.vertices, triangles) > 0)
+    return candidates & (folded | backwards(vertices, triangles, hits.normals))
 
 
 def wrong_sheet(
@@ -94,8 +89,3 @@ def stretched_triangles(source: TriangleMesh, vertices: Array, skin: Mask) -> Ma
 def share(mask: Mask, among: Mask) -> float:
     """Share of ``among`` that is in ``mask``; 0 of nothing."""
     return float(np.count_nonzero(mask & among)) / max(int(np.count_nonzero(among)), 1)
-
-
-def _agreement(vertices: Array, triangles: NDArray[np.integer]) -> Array:
-    around = vertex_normals(vertices, triangles)[triangles].sum(axis=1)
-    return np.einsum("fd,fd->f", face_normals(vertices, triangles), around)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from toolkit.errors import InputError
-from toolkit.mesh import TriangleMesh, face_normals, vertex_adjacency, vertex_normals
+from toolkit.mesh import TriangleMesh, vertex_adjacency, vertex_normals
+from toolkit.registration.folds import agreement, backwards
 from toolkit.registration.surface import Hits
 from toolkit.rigid import umeyama
 from toolkit.solve import factorise
@@ -23,8 +24,8 @@ Mask = NDArray[np.bool_]
 _ROUNDS, _FIRST_RINGS = 6, 2
 _TURNED = 0.1
 """Cosine to its neighbours' mean normal below which a triangle counts as turned over."""
-_FLAT, _AGREES = 0.9, 0.5
-"""Mean length of the target's normals under a triangle from which on they say which side is out."""
+_AGREES = 0.5
+"""Cosine to the target's normal from which on a vertex that was laid lies on the right side of the surface."""
 
 
 def unfold(source: TriangleMesh, points: Array, skin: Mask, closest: Callable[[Array], Hits]) -> Array:
@@ -44,7 +45,7 @@ def unfold(source: TriangleMesh, points: Array, skin: Mask, closest: Callable[[A
     """
     adjacency = vertex_adjacency(source.triangles, len(points)).astype(bool).tocsr()
     triangles, outside, laid = source.triangles, closest(points).normals, points
-    judged = skin[triangles].all(axis=1) & (_agreement(source.vertices, triangles) > _TURNED)
+    judged = skin[triangles].all(axis=1) & (agreement(source.vertices, triangles) > _TURNED)
     bad = judged & _turned(triangles, laid, outside)
     if not bad.any():
         return points
@@ -98,16 +99,7 @@ def _around(triangles: NDArray[np.integer], adjacency: sp.csr_matrix, rings: int
 
 def _turned(triangles: NDArray[np.integer], points: Array, outside: Array) -> Mask:
     """Mask ``(F,)``: against its neighbours, or with the back to the target's outside where that is sure."""
-    out = outside[triangles].mean(axis=1)
-    flat = np.linalg.norm(out, axis=1) > _FLAT
-    backwards = flat & (np.einsum("fd,fd->f", face_normals(points, triangles), out) < 0)
-    return np.asarray((_agreement(points, triangles) < _TURNED) | backwards)
-
-
-def _agreement(points: Array, triangles: NDArray[np.integer]) -> Array:
-    """Cosine ``(F,)``, about, between a triangle's normal and those of its corners."""
-    around = vertex_normals(points, triangles)[triangles].mean(axis=1)
-    return np.asarray(np.einsum("fd,fd->f", face_normals(points, triangles), around))
+    return np.asarray((agreement(points, triangles) < _TURNED) | backwards(points, triangles, outside))
 
 
 def _relaid(source: Array, points: Array, adjacency: sp.csr_matrix, loose: Mask) -> Array:
