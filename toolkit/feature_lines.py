@@ -27,7 +27,9 @@ __all__ = [
     "EdgePaths",
     "FeatureLine",
     "Opening",
+    "corners_of",
     "find_openings",
+    "halves",
     "line_edges",
     "load_feature_lines",
     "save_feature_lines",
@@ -71,10 +73,6 @@ class Opening:
     name: str
     upper: Ids
     lower: Ids
-
-    def width(self, vertices: NDArray[np.floating]) -> float:
-        """Distance from corner to corner, in mesh units."""
-        return float(np.linalg.norm(vertices[self.upper[0]] - vertices[self.upper[-1]]))
 
 
 class EdgePaths:
@@ -184,19 +182,23 @@ def find_openings(lines: Sequence[FeatureLine], vertices: NDArray[np.float64]) -
         is_rim = any(word in line.name for word in _OPENING_WORDS) and "outer" not in line.name
         if not line.closed or not is_rim or len(covered.intersection(line.vertices.tolist())) > 2:
             continue
-        openings.append(_split_at_corners(line, vertices))
+        # Which side is called the upper one does not matter to the contacts.
+        openings.append(Opening(line.name, *halves(line.vertices, *corners_of(vertices[line.vertices]))))
     return openings
 
 
-def _split_at_corners(line: FeatureLine, vertices: NDArray[np.float64]) -> Opening:
-    points = vertices[line.vertices]
-    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
+def corners_of(ring: NDArray[np.floating]) -> tuple[int, int]:
+    """The two points of a closed line ``(n, 3)`` that are farthest apart, the earlier one first."""
+    apart = np.linalg.norm(ring[:, None] - ring[None], axis=2)
     first, last = sorted(int(i) for i in np.unravel_index(np.argmax(apart), apart.shape))
-    loop = np.roll(line.vertices, -first)
-    split = last - first
-    one, other = loop[: split + 1], np.append(loop[split:], loop[0])[::-1]
-    # Which side is called the upper one does not matter to the contacts.
-    return Opening(line.name, one, other)
+    return first, last
+
+
+def halves(ring: Ids, first: int, last: int) -> tuple[Ids, Ids]:
+    """The two ways from ``ring[first]`` to ``ring[last]`` along a closed line ``(n,)``."""
+    turned = np.roll(ring, -first)
+    split = (last - first) % len(ring)
+    return turned[: split + 1], np.append(turned[split:], turned[0])[::-1]
 
 
 def load_feature_lines(path: str | Path, n_source: int | None = None, n_target: int | None = None) -> list[FeatureLine]:

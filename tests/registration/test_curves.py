@@ -1,4 +1,4 @@
-"""Lines on both faces: closest points, matching, and the sheets that they part."""
+"""Lines on both faces: matching and the sheets that they part."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import numpy as np
 
 from toolkit.feature_lines import FeatureLine
 from toolkit.registration.curves import (
-    closest_on_polyline,
     loops_of,
     match_lines,
     opposite_sheets,
@@ -14,18 +13,6 @@ from toolkit.registration.curves import (
     source_rims,
     voted_labels,
 )
-
-
-def test_closest_points_on_a_polyline_against_dense_sampling() -> None:
-    rng = np.random.default_rng(0)
-    line = np.cumsum(rng.normal(size=(9, 3)), axis=0)
-    at = np.linspace(0, 8, 8001)
-    dense = np.stack([np.interp(at, np.arange(9), line[:, k]) for k in range(3)], axis=1)
-    points = 3 * rng.normal(size=(30, 3))
-    found = np.linalg.norm(closest_on_polyline(points, line) - points, axis=1)
-    best = np.linalg.norm(dense[None] - points[:, None], axis=2).min(axis=1)
-    assert np.all(found <= best + 1e-12)
-    np.testing.assert_allclose(found, best, atol=2e-3)
 
 
 def _matched(pair, lines: list[FeatureLine]):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.feature_lines import Opening
+from toolkit.mesh.closest import closest_on_polyline
 
 __all__ = ["ContactGaps", "contact_gaps", "inner_rim", "rim_gaps"]
 
@@ -99,9 +100,5 @@ def contact_gaps(
 
 
 def _to_polyline(points: NDArray[np.floating], line: NDArray[np.floating]) -> Array:
-    points, line = np.asarray(points, dtype=np.float64), np.asarray(line, dtype=np.float64)
-    start, along = line[:-1], np.diff(line, axis=0)
-    squared = np.maximum(np.sum(along**2, axis=1), 1e-300)
-    from_start = points[:, None] - start
-    share = np.clip(np.einsum("nmi,mi->nm", from_start, along) / squared, 0, 1)
-    return np.sqrt(np.sum((from_start - share[..., None] * along) ** 2, axis=2).min(axis=1))
+    exact = np.asarray(points, dtype=np.float64)
+    return np.asarray(np.linalg.norm(closest_on_polyline(exact, np.asarray(line, dtype=np.float64)) - exact, axis=1))

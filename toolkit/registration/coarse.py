@@ -9,10 +9,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from toolkit.mesh import TriangleMesh
+from toolkit.mesh.closest import closest_weights
 from toolkit.operators import uniform_laplacian
 from toolkit.solve import factorise
 
-__all__ = ["Coarse", "Gather", "closest_on_triangles", "decimate"]
+__all__ = ["Coarse", "Gather", "decimate"]
 
 Array = NDArray[np.float64]
 
@@ -83,37 +84,12 @@ def _barycentric_rows(points: Array, coarse: TriangleMesh, landed: NDArray[np.in
     for k in range(int(counts.max(initial=0))):
         rows = np.flatnonzero(counts > k)
         candidate = near.indices[near.indptr[landed[rows]] + k]
-        bary, squared = closest_on_triangles(points[rows], coarse.vertices[corners[candidate]])
+        places = coarse.vertices[corners[candidate]]
+        bary = closest_weights(points[rows], places)
+        squared = np.sum((points[rows] - np.einsum("nk,nkd->nd", bary, places)) ** 2, axis=1)
         better = squared < best[rows]
         chosen = rows[better]
         best[chosen], triangle[chosen], weights[chosen] = squared[better], candidate[better], bary[better]
     columns = np.where(np.isfinite(best)[:, None], corners[triangle], landed[:, None])
     rows = np.repeat(np.arange(len(points)), 3)
     return sp.csr_matrix((weights.ravel(), (rows, columns.ravel())), shape=(len(points), n))
-
-
-def closest_on_triangles(p: Array, triangles: Array) -> tuple[Array, Array]:
-    """Barycentrics ``(N, 3)`` and squared distance ``(N,)`` of the closest point of one triangle each ``(N, 3, 3)``.
-
-    Inside the triangle the plane's projection; otherwise the best of the three edges.
-    """
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    u, v, w = b - a, c - a, p - a
-    uu, uv, vv = (np.einsum("nd,nd->n", *pair) for pair in ((u, u), (u, v), (v, v)))
-    wu, wv = np.einsum("nd,nd->n", w, u), np.einsum("nd,nd->n", w, v)
-    area = np.maximum(uu * vv - uv * uv, 1e-300)
-    s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
-    bary = np.stack([1 - s - t, s, t], axis=1)
-    outside = np.any(bary < 0, axis=1)
-    squared = np.sum((p - np.einsum("nk,nkd->nd", bary, triangles)) ** 2, axis=1)
-    squared[outside] = np.inf
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        start, along = triangles[:, i], triangles[:, j] - triangles[:, i]
-        length = np.maximum(np.einsum("nd,nd->n", along, along), 1e-300)
-        at = np.clip(np.einsum("nd,nd->n", p - start, along) / length, 0, 1)
-        gap = np.sum((p - start - at[:, None] * along) ** 2, axis=1)
-        better = outside & (gap < squared)
-        squared[better] = gap[better]
-        bary[better] = 0.0
-        bary[better, i], bary[better, j] = 1 - at[better], at[better]
-    return bary, squared

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
 
-from toolkit.feature_lines import FeatureLine, find_openings, shortest_edge_path, trace_lines
+from toolkit.feature_lines import FeatureLine, corners_of, find_openings, halves, shortest_edge_path, trace_lines
 from toolkit.mesh import TriangleMesh, edge_graph, unique_edges
 
 __all__ = [
     "Curve",
-    "closest_on_polyline",
     "loops_of",
     "match_lines",
     "opposite_sheets",
@@ -30,6 +29,8 @@ _STEADY = 1.5
 """A vertex belongs to a sheet when the other sheet's rim is this much farther along the surface."""
 _REACH = 0.5
 """How far a sheet reaches from its rim, in widths of the opening."""
+_FAIRINGS = 3
+"""Passes that take the zigzag out of a path along edges."""
 
 
 @dataclass(frozen=True)
@@ -96,16 +97,6 @@ def loops_of(curves: Sequence[Curve], on_target: bool = False) -> list[Ids]:
     ]
 
 
-def closest_on_polyline(points: Array, polyline: Array) -> Array:
-    """Closest points ``(N, 3)`` on a polyline ``(m, 3)`` to ``points`` (N, 3)."""
-    start, along = polyline[:-1], np.diff(polyline, axis=0)
-    length = np.maximum(np.sum(along**2, axis=1), 1e-300)
-    at = np.clip(np.einsum("nmd,md->nm", points[:, None] - start[None], along) / length, 0, 1)
-    candidates = start[None] + at[..., None] * along
-    nearest = np.argmin(np.sum((candidates - points[:, None]) ** 2, axis=2), axis=1)
-    return candidates[np.arange(len(points)), nearest]
-
-
 def sheet_labels(
     mesh: TriangleMesh, skin: NDArray[np.bool_], curves: Sequence[Curve], on_target: bool
 ) -> dict[str, NDArray[np.int8]]:
@@ -157,30 +148,22 @@ def _along(path: Ids, posed: Array, vertices: Array) -> Ids:
 
 
 def _split(ids: Ids, path: Ids, posed: Array, vertices: Array) -> list[tuple[Ids, Ids]]:
-    apart = np.linalg.norm(posed[ids][:, None] - posed[ids][None], axis=2)
-    first, last = sorted(int(i) for i in np.unravel_index(np.argmax(apart), apart.shape))
+    first, last = corners_of(posed[ids])
     corners = [int(np.argmin(np.linalg.norm(vertices[path] - posed[ids[k]], axis=1))) for k in (first, last)]
     if corners[0] == corners[1]:
         return []
-    halves, over = _halves(ids, first, last), _halves(path, corners[0], corners[1])
-    middle = posed[halves[0]].mean(axis=0)
+    sides, over = halves(ids, first, last), halves(path, corners[0], corners[1])
+    middle = posed[sides[0]].mean(axis=0)
     if np.linalg.norm(vertices[over[1]].mean(axis=0) - middle) < np.linalg.norm(
         vertices[over[0]].mean(axis=0) - middle
     ):
         over = over[::-1]
-    return list(zip(halves, over, strict=True))
+    return list(zip(sides, over, strict=True))
 
 
-def _halves(ring: Ids, first: int, last: int) -> list[Ids]:
-    """The two ways from ``ring[first]`` to ``ring[last]``."""
-    turned = np.roll(ring, -first)
-    split = (last - first) % len(ring)
-    return [turned[: split + 1], np.append(turned[split:], turned[0])[::-1]]
-
-
-def _faired(points: Array, rounds: int = 3) -> Array:
+def _faired(points: Array) -> Array:
     """Take the zigzag of edge paths out of a polyline ``(m, 3)``; its ends stay."""
     smooth = points.copy()
-    for _ in range(rounds):
+    for _ in range(_FAIRINGS):
         smooth[1:-1] = 0.5 * smooth[1:-1] + 0.25 * (smooth[:-2] + smooth[2:])
     return smooth

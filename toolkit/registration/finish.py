@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 
 from toolkit.errors import InputError
 from toolkit.mesh import TriangleMesh, vertex_adjacency, vertex_normals
-from toolkit.registration.curves import Curve, closest_on_polyline
+from toolkit.mesh.closest import closest_on_polyline
+from toolkit.registration.curves import Curve
 from toolkit.registration.nonrigid import SheetedSurface, accepted
 from toolkit.registration.parameters import RegistrationParameters
 from toolkit.rigid import umeyama

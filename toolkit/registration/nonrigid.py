@@ -10,10 +10,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from toolkit.mesh import TriangleMesh, unique_edges, vertex_normals
+from toolkit.mesh.closest import closest_on_polyline
 from toolkit.operators import uniform_laplacian
 from toolkit.progress import Progress
 from toolkit.registration.coarse import Coarse
-from toolkit.registration.curves import Curve, closest_on_polyline
+from toolkit.registration.curves import Curve
 from toolkit.registration.parameters import RegistrationParameters
 from toolkit.registration.surface import Hits, Surface
 from toolkit.solve import factorise
