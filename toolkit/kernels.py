@@ -101,8 +101,16 @@ def place_block(points, shift, turns, starts, out):
 
     ``points``, ``shift`` and ``out`` (V, 3, B), ``turns`` (3, 3, B) and ``starts`` (3, B) float32.
     """
+    if points.shape[2] == 1:  # what is displayed: told so, the compiler needs a quarter of the time
+        _place_frames(points, shift, turns, starts, out, 1)
+    else:
+        _place_frames(points, shift, turns, starts, out, points.shape[2])
+
+
+@njit(forceinline=True, **ARITHMETIC)
+def _place_frames(points, shift, turns, starts, out, n_frames):
     for v in range(len(points)):
-        for b in range(points.shape[2]):
+        for b in range(n_frames):
             x, y, z = (
                 points[v, 0, b] + shift[v, 0, b],
                 points[v, 1, b] + shift[v, 1, b],
