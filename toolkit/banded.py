@@ -150,9 +150,11 @@ class _Frames:
         self._factor = bands
 
     def solve(self, right: Array) -> Array:
-        solved = right.flatten()
+        n, width = self._factor.shape
+        solved = np.zeros(n + width)
+        solved[:n] = right.ravel()
         _substitute(self._factor, solved)
-        return solved.reshape(right.shape)
+        return solved[:n].reshape(right.shape)
 
     def answers(self, rows: FrameRows) -> Array:
         """``B P^-1 B^T = (L^-1 B^T)^T (L^-1 B^T)``, (R, R)."""
@@ -257,18 +259,20 @@ def _forward(factor, columns, first):  # type: ignore[no-untyped-def]  # compile
                 columns[i + j, c] -= factor[i, j] * columns[i, c]
 
 
-# Sums in any order: else a dot product is one number after the other.
+# Sums in any order, else a dot product is one number after the other.
 @njit(**ARITHMETIC | {"fastmath": {"contract", "reassoc"}})
 def _substitute(factor, x):  # type: ignore[no-untyped-def]  # compiled
-    """``L^-T L^-1 x`` (N,) in place; ``factor`` as for `_forward`."""
+    """``L^-T L^-1 x`` in place; ``factor`` (N, W) as for `_forward`, and ``x`` (N + W,), are zero beyond their rows."""
     n, width = factor.shape
     for i in range(n):
-        value = x[i] / factor[i, 0]
-        x[i] = value
-        for j in range(1, min(width, n - i)):
-            x[i + j] -= factor[i, j] * value
+        column, y = factor[i], x[i : i + width]
+        value = y[0] / column[0]
+        y[0] = value
+        for j in range(1, width):
+            y[j] -= column[j] * value
     for i in range(n - 1, -1, -1):
+        column, y = factor[i], x[i : i + width]
         value = 0.0
-        for j in range(1, min(width, n - i)):
-            value += factor[i, j] * x[i + j]
-        x[i] = (x[i] - value) / factor[i, 0]
+        for j in range(1, width):
+            value += column[j] * y[j]
+        y[0] = (y[0] - value) / column[0]
