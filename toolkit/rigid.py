@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from toolkit.errors import InputError
 
-__all__ = ["Similarity", "kabsch", "umeyama"]
+__all__ = ["Similarity", "umeyama"]
 
 Array = NDArray[np.float64]
 
@@ -73,14 +73,6 @@ def umeyama(
     rotation = (left * signs) @ right
     factor = float(singular @ signs / (w @ np.sum(dx * dx, axis=1))) if scale else 1.0
     return Similarity(factor, rotation, mean_y - factor * (rotation @ mean_x))
-
-
-def kabsch(
-    source: NDArray[np.floating], target: NDArray[np.floating], weights: NDArray[np.floating] | None = None
-) -> tuple[Array, Array]:
-    """Best rotation ``(3, 3)`` and translation ``(3,)``, ``target ~ source @ R.T + t`` (Kabsch 1976)."""
-    motion = umeyama(source, target, weights, scale=False)
-    return motion.rotation, motion.translation
 
 
 def _checked_weights(x: Array, y: Array, weights: NDArray[np.floating] | None) -> Array:
