@@ -50,9 +50,9 @@ def transfer_bases(
 ) -> Array:
     """The target's smoothed bases ``(K, V, 3)``.
 
-    ``moves`` (K, V, 3) are those of the smoothed source that ``system`` was made with, ``details`` (K, V, 3) its motion
-    details in the same frames, ``gain`` (V,) their factor, ``source_gaps`` (K, P, 3) the gaps of the visible source,
-    ``contact_map`` what they become on the target.
+    ``moves`` (K, V, 3) are those of the smoothed source that ``system`` was made with, ``details`` (K, U, 3) its motion
+    details in the same frames at the contact pairs' vertices, ``gain`` (V,) their factor, ``source_gaps`` (K, P, 3) the
+    gaps of the visible source, ``contact_map`` what they become on the target.
     """
     pairs = system.pairs
     if not len(pairs) or not len(moves):
@@ -60,7 +60,7 @@ def transfer_bases(
     ids, n_vertices = pairs.vertices, len(system.target)
     local, gap = LocalDetails(target, ids), pairs.rows(n_vertices)[:, ids]
     patch = local.patch
-    moved = np.asarray(details[:, ids], dtype=np.float64) * gain[ids, None]
+    moved = details * gain[ids, None]
     solving = PulledSolve(system.factor, system.right.reshape(n_vertices, -1), patch.ids)
 
     def pulls(goals: Array) -> Array:

@@ -33,11 +33,12 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     """Factorise once, solve for all bases."""
     target = target_decomposer(shot)
     frames = np.array(shot.array("bases", "frames"))
-    moves, details = (shot.array("decompose", name)[frames] for name in ("smooth_deltas", "details"))
+    moves = shot.array("decompose", "smooth_deltas")[frames]
     progress("factorising", 0, 1)
     system = _system(shot, target, moves)
     progress("factorising", 1, 1)
     gain = detail_gain(shot.config.details, system.source, target)
+    details = shot.array("decompose", "details")[np.ix_(frames, system.pairs.vertices)]
     gaps = np.array(shot.array("bases", "pair_gaps"))[1:][frames]
     contact_map = ContactMap(load_pairs(shot), load_mesh(shot, "source").vertices, target.mesh.vertices)
     bases = transfer_bases(system, target, moves, details, gain, contact_map, gaps, progress)
