@@ -39,12 +39,10 @@ class ColorScale:
         return cls(0.0, _positive(np.percentile(finite, percentile)), label, unit, cmap)
 
     @classmethod
-    def signed(
-        cls, values: ArrayLike, label: str = "", unit: str = "", *, percentile: float = 99.0, cmap: str = "coolwarm"
-    ) -> ColorScale:
+    def signed(cls, values: ArrayLike, label: str = "", unit: str = "", *, percentile: float = 99.0) -> ColorScale:
         """Symmetric about zero, so that zero is the map's neutral middle."""
         reach = _positive(np.percentile(np.abs(_finite(values)), percentile))
-        return cls(-reach, reach, label, unit, cmap)
+        return cls(-reach, reach, label, unit, "coolwarm")
 
     def colors(self, values: ArrayLike) -> NDArray[np.uint8]:
         """Colours ``(..., 3)`` uint8 of ``values`` (...); what is not finite is grey."""

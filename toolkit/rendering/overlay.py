@@ -15,6 +15,7 @@ from toolkit.rendering.camera import Camera
 __all__ = ["Lines", "Markers", "draw_overlays", "visible"]
 
 Color = tuple[int, int, int]
+_SLACK = 0.01  # of the picture's height where the camera looks: what a point on the surface may seem to lie behind it
 _FINE = 3  # the overlay is drawn this much larger and reduced, since Pillow draws without anti-aliasing
 
 
@@ -37,13 +38,10 @@ class Markers:
     radius: float = 3.5
 
 
-def visible(
-    points: NDArray[np.float64], camera: Camera, nearness: NDArray[np.float32], tolerance: float = 0.01
-) -> NDArray[np.bool_]:
-    """Mask ``(N,)`` of the points that the surface does not hide.
+def visible(points: NDArray[np.float64], camera: Camera, nearness: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Mask ``(N,)`` of the points (N, 3) that the surface does not hide.
 
-    ``nearness`` (h, w) is 1 / depth of the nearest surface, 0 where there is none; a point counts as seen when it is
-    not behind the surface by more than ``tolerance`` of its depth's spread (camera distance times tolerance).
+    ``nearness`` (h, w) is 1 / depth of the nearest surface, 0 where there is none.
     """
     height, width = nearness.shape
     screen = camera.project(points, (width, height))
@@ -51,7 +49,7 @@ def visible(
     inside = (screen[:, 2] > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
     seen = np.zeros(len(points), dtype=bool)
     surface = nearness[y[inside], x[inside]].astype(np.float64)
-    slack = tolerance * np.tan(np.radians(camera.fov) / 2) * camera.distance * 2
+    slack = _SLACK * np.tan(np.radians(camera.fov) / 2) * camera.distance * 2
     seen[inside] = (surface <= 0) | (screen[inside, 2] <= 1 / np.maximum(surface, 1e-30) + slack)
     return seen
 

@@ -17,16 +17,16 @@ CLOSE_UPS: dict[str, tuple[str, float, float]] = {
     "features": (r"eye|lid|canthus|brow|nose|nasal|lip|mouth|chin|menton|gnathion|pogonion", 1.15, 0.8),
 }
 """Name to (pattern of the landmarks' names, how much larger than their box to show, width / height of the picture)."""
+_ENLARGED = 1.3
+"""The face itself, beside the box of all its landmarks."""
 
 
-def face_vertices(
-    rest: NDArray[np.float64], landmarks: Mapping[str, int], enlarged: float = 1.3
-) -> NDArray[np.int64] | None:
+def face_vertices(rest: NDArray[np.float64], landmarks: Mapping[str, int]) -> NDArray[np.int64] | None:
     """Ids of the vertices (N,) round all ``landmarks`` (name to vertex), so that shoulders do not shrink the face.
 
     None where there are too few landmarks to tell.
     """
-    return _in_box(rest, list(landmarks.values()), enlarged) if len(landmarks) >= 6 else None
+    return _in_box(rest, list(landmarks.values()), _ENLARGED) if len(landmarks) >= 6 else None
 
 
 def close_up_vertices(name: str, rest: NDArray[np.float64], landmarks: Mapping[str, int]) -> NDArray[np.int64] | None:

@@ -24,6 +24,8 @@ __all__ = ["View", "choose_frames", "performance_sheet", "performance_video", "p
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
+_ASPECT = 0.8
+
 
 @dataclass(frozen=True)
 class View:
@@ -96,14 +98,13 @@ def pictures_of(
     camera: Camera,
     size: tuple[int, int],
     *,
-    supersample: int = 2,
     workers: int | None = None,
 ) -> Iterator[Image]:
     """Render ``frames`` one after another on threads, in order; only a few pictures are held at a time."""
     renderer = view.renderer()
 
     def draw(index: int) -> Image:
-        return renderer.render(view.drawn(index), camera, size, supersample=supersample)
+        return renderer.render(view.drawn(index), camera, size)
 
     count = workers or worker_count()
     with ThreadPoolExecutor(count) as pool:
@@ -125,7 +126,7 @@ def performance_sheet(
     frames: Sequence[int],
     *,
     width: int = 300,
-    aspect: float = 0.8,
+    aspect: float = _ASPECT,
     turn: float = 0.0,
     title: str = "",
     only: NDArray[np.integer] | None = None,
@@ -147,18 +148,13 @@ def performance_video(
     frames: Sequence[int],
     *,
     height: int = 600,
-    aspect: float = 0.8,
     turn: float = 0.0,
-    workers: int | None = None,
     progress: Progress = silent,
 ) -> Iterator[Image]:
     """Yield the frames of a side-by-side video of all views, labelled, the frame's number at the right."""
     _check_frames(views, frames)
-    size = (2 * round(height * aspect / 2), 2 * round(height / 2))
-    cameras = [view.camera(aspect, turn=turn) for view in views]
-    streams = [
-        pictures_of(view, frames, camera, size, workers=workers) for view, camera in zip(views, cameras, strict=True)
-    ]
+    size = (2 * round(height * _ASPECT / 2), 2 * round(height / 2))
+    streams = [pictures_of(view, frames, view.camera(_ASPECT, turn=turn), size) for view in views]
     labels = [view.label for view in views]
     for done, (index, *images) in enumerate(zip(frames, *streams, strict=True), start=1):
         yield side_by_side(images, labels, str(index))

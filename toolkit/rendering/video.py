@@ -18,14 +18,15 @@ __all__ = ["write_video"]
 
 _LOG = logging.getLogger(__name__)
 _CODECS = ("libx264", "libopenh264", "mpeg4")
+_QUALITY = "20"  # x264's constant rate factor: lower is better and larger
 
 
-def write_video(path: Path | str, images: Iterable[NDArray[np.uint8]], fps: float, *, quality: int = 20) -> int:
+def write_video(path: Path | str, images: Iterable[NDArray[np.uint8]], fps: float) -> int:
     """Write ``images`` (h, w, 3) uint8 one after another and return how many there were.
 
     H.264 with 4:2:0 colour and the index in front, so that it plays everywhere and while it loads; odd sizes lose
-    their last row or column. Where the encoder is missing, MPEG-4 is used and said. ``quality`` is x264's constant
-    rate factor: lower is better and larger. An exception on the way leaves no file.
+    their last row or column. Where the encoder is missing, MPEG-4 is used and said. An exception on the way leaves
+    no file.
     """
     import av
 
@@ -37,7 +38,7 @@ def write_video(path: Path | str, images: Iterable[NDArray[np.uint8]], fps: floa
         for count, image in enumerate(images, start=1):
             height, width = (n - n % 2 for n in image.shape[:2])
             if stream is None:
-                stream = _add_stream(container, (width, height), fps, quality)
+                stream = _add_stream(container, (width, height), fps)
             elif (width, height) != (stream.width, stream.height):
                 raise InputError(
                     f"picture {count - 1} is {width} x {height}, the first is {stream.width} x {stream.height}",
@@ -51,13 +52,13 @@ def write_video(path: Path | str, images: Iterable[NDArray[np.uint8]], fps: floa
     return count
 
 
-def _add_stream(container: Any, size: tuple[int, int], fps: float, quality: int) -> Any:
+def _add_stream(container: Any, size: tuple[int, int], fps: float) -> Any:
     codec = _available_codec()
     stream = container.add_stream(codec, rate=Fraction(fps).limit_denominator(1001))
     stream.width, stream.height = size
     stream.pix_fmt = "yuv420p"
     if codec == "libx264":
-        stream.options = {"crf": str(quality), "preset": "fast"}
+        stream.options = {"crf": _QUALITY, "preset": "fast"}
     else:
         stream.bit_rate = 8_000_000
     return stream
