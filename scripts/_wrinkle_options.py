@@ -145,7 +145,7 @@ def wrinkle_of(options: argparse.Namespace, session: EditSession) -> DetailEdit:
     if options.reshape_to is None:
         return _copy(options, session, common)
     if options.curve is None:
-        raise InputError("--reshape-to needs the --curve that the wrinkle runs along")
+        raise InputError("--reshape-to needs the --curve that the wrinkle runs along", remedy="give --curve, too")
     curve, goal = (_curve(text, session) for text in (options.curve, options.reshape_to))
     return ReshapeEdit(curve=curve, goal=goal, **common)
 
@@ -193,7 +193,7 @@ def _dabs(options: argparse.Namespace, session: EditSession) -> list[Dab]:
     for text, erase in [(text, False) for text in options.brush] + [(text, True) for text in options.erase]:
         vertex, _, radius = text.partition("=")
         if not vertex.isdecimal():
-            raise InputError(f"{text!r} is not a vertex and a radius such as 4711=2%")
+            raise InputError(f"{text!r} is not a vertex and a radius such as 4711=2%", remedy="write VERTEX=RADIUS")
         point = surface.at_vertex(int(vertex))
         dabs.append(Dab(point, _on_skin(radius, session), hardness=options.hardness, erase=erase))
     return dabs

@@ -119,7 +119,11 @@ def _make(entry: Entry) -> None:
         return
     missing = [key for key in PATHS[:3] if key not in entry.inputs]
     if missing:
-        raise InputError(f"the shot is not there, and the list gives no {missing[0]}", where=entry.folder)
+        raise InputError(
+            f"the shot is not there, and the list gives no {missing[0]}",
+            where=entry.folder,
+            remedy="add it to the list, or make the shot first",
+        )
     create_shot(entry.folder, **entry.inputs)
 
 

@@ -106,7 +106,7 @@ class ReshapeEdit(KeyedEdit):
     def __post_init__(self) -> None:
         super().__post_init__()
         if min(len(self.curve), len(self.goal)) < 2:
-            raise InputError("a curve needs at least two points")
+            raise InputError("a curve needs at least two points", remedy="draw it through two points or more")
         if not (np.isfinite(self.stiffness) and self.stiffness > 0):
             raise InputError(f"a stiffness of {self.stiffness} makes no sense", remedy="give a number above 0")
 
@@ -129,9 +129,14 @@ class GainEdit:
         _check_finite(band=self.band)
         frames = [frame for frame, _ in self.gains]
         if not frames or any(b <= a for a, b in pairwise(frames)):
-            raise InputError(f"the gain's frames {frames} must be one or more, each later than the one before")
+            raise InputError(
+                f"the gain's frames {frames} must be one or more, each later than the one before",
+                remedy="name each frame once, in order",
+            )
         if not all(np.isfinite(gain) for _, gain in self.gains):
-            raise InputError(f"the gains {[gain for _, gain in self.gains]} are not all numbers")
+            raise InputError(
+                f"the gains {[gain for _, gain in self.gains]} are not all numbers", remedy="give finite numbers"
+            )
         if self.details == "static" and len(self.gains) > 1:
             raise InputError(
                 "the face's own details are the same in all frames and take one gain", remedy="give one (frame, gain)"
@@ -151,4 +156,4 @@ def _check_choice(name: str, value: str, known: tuple[str, ...]) -> None:
 def _check_finite(**values: float) -> None:
     for name, value in values.items():
         if not np.isfinite(value):
-            raise InputError(f"{name} = {value} is no number")
+            raise InputError(f"{name} = {value} is no number", remedy="give a finite one")

@@ -127,11 +127,14 @@ def _reshape_patch(edit: ReshapeEdit, region: Region, take: DetailTake) -> FlatP
         if farthest + margin <= limit:
             break
     if not np.isfinite(farthest):
-        raise InputError("the region and the two curves do not lie on one part of the face that hangs together")
+        raise InputError(
+            "the region and the two curves do not lie on one part of the face that hangs together",
+            remedy="draw both lines on the skin that the region is on",
+        )
     centre = edit.curve.point(len(edit.curve) // 2)
     flat = _patch(take, np.flatnonzero(gap <= farthest + margin), centre, _axes_at(take, centre))
     if flat is None:
-        raise InputError("there is no skin round the wrinkle's curve")
+        raise InputError("there is no skin round the wrinkle's curve", remedy="draw the line on the skin")
     return flat
 
 

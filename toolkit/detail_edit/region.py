@@ -59,7 +59,10 @@ class Region:
     def field(self, n_vertices: int) -> Array:
         """The weight of every vertex of the face ``(V,)``."""
         if len(self) and self.vertices[-1] >= n_vertices:
-            raise InputError(f"the region has a vertex {self.vertices[-1]}, the face only {n_vertices} vertices")
+            raise InputError(
+                f"the region has a vertex {self.vertices[-1]}, the face only {n_vertices} vertices",
+                remedy="select it again on this face",
+            )
         field = np.zeros(n_vertices)
         field[self.vertices] = self.weights
         return field
@@ -111,7 +114,9 @@ def painted(surface: Surface, dabs: Sequence[Dab], start: Region | None = None) 
 def within(surface: Surface, curve: Curve, distance: float, soft: float = 0.0) -> Region:
     """Everything within a distance of a curve (the paper's section 5.2), fading over ``soft`` more."""
     if not (np.isfinite(distance) and distance >= 0 and np.isfinite(soft) and soft >= 0):
-        raise InputError(f"a distance of {distance} with a soft border of {soft} selects nothing")
+        raise InputError(
+            f"a distance of {distance} with a soft border of {soft} selects nothing", remedy="give numbers from 0 on"
+        )
     away = surface.distance(curve, distance + soft)
     return Region.of(_fading(away - distance, soft))
 

@@ -79,7 +79,7 @@ class Surface:
         return np.asarray(total / np.maximum(np.bincount(ends, minlength=self.n_vertices), 1))
 
     def edge(self, vertices: Ids | None = None) -> float:
-        """Median length of the edges, of the whole mesh or of those at some vertices (n,)."""
+        """Median over the vertices, or over some (n,), of the mean length of the edges there."""
         at = self._edge_at if vertices is None else self._edge_at[vertices]
         return float(np.median(at))
 
@@ -108,7 +108,9 @@ class Surface:
         """A vertex as a point of the surface."""
         self.check_vertices(np.array([vertex]))
         if self._first[vertex] == self._first[vertex + 1]:
-            raise InputError(f"vertex {vertex} belongs to no triangle, so nothing can be drawn there")
+            raise InputError(
+                f"vertex {vertex} belongs to no triangle, so nothing can be drawn there", remedy="choose another vertex"
+            )
         triangle = int(self._around[self._first[vertex]])
         return SurfacePoint(triangle, _triple((self.triangles[triangle] == vertex).astype(float)))
 

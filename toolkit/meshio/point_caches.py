@@ -46,7 +46,11 @@ def open_pc2(path: Path, fps: float | None) -> FrameSequence:
     """Open a PC2 point cache, memory-mapped. It does not say its frame rate."""
     header = _header(path, PC2_HEADER)
     if header["magic"] != b"POINTCACHE2":
-        raise InputError("is not a PC2 point cache: its first bytes are not POINTCACHE2", where=path)
+        raise InputError(
+            "is not a PC2 point cache: its first bytes are not POINTCACHE2",
+            where=path,
+            remedy="export it again, or name it after its own format",
+        )
     return _map(path, "<f4", PC2_HEADER.itemsize, int(header["frames"]), int(header["points"]), fps)
 
 

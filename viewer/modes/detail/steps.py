@@ -124,7 +124,7 @@ class DetailSteps(ToolEdit[DetailDraft]):
         if not name:
             raise InputError("the region has no name yet", remedy="type one in")
         if region is None or not len(region):
-            raise InputError("nothing is selected to be saved")
+            raise InputError("nothing is selected to be saved", remedy="paint a region, or draw a line, first")
         self.reload_regions()
         self.saved[name] = region
         save_regions(self.app.shot, self.saved)
