@@ -17,21 +17,22 @@ __all__ = ["FORMATS", "ExportReport", "Format", "export", "file_name"]
 
 @dataclass(frozen=True)
 class Format:
-    """A format: the ``suffixes`` of its files, the first by default; none for a folder of frames."""
+    """A format in ``words``, and the ``suffixes`` of its files, the first by default; none for a folder of frames."""
 
+    words: str
     suffixes: tuple[str, ...]
     writer: str  # module:function, imported when the format is asked for
 
 
 FORMATS = {
-    "gltf": Format((".glb",), "gltf:write_glb"),
-    "usd": Format((".usdc", ".usd", ".usda"), "usd:write_usd"),
-    "abc": Format((".abc",), "alembic:write_alembic"),
-    "pc2": Format((".pc2",), "point_caches:write_pc2"),
-    "mdd": Format((".mdd",), "point_caches:write_mdd"),
-    "npy": Format((".npy",), "point_caches:write_npy"),
-    "obj": Format((), "folders:write_obj_frames"),
-    "ply": Format((), "folders:write_ply_frames"),
+    "gltf": Format("glTF (.glb): bases as morph targets", (".glb",), "gltf:write_glb"),
+    "usd": Format("USD (.usdc)", (".usdc", ".usd", ".usda"), "usd:write_usd"),
+    "abc": Format("Alembic (.abc)", (".abc",), "alembic:write_alembic"),
+    "pc2": Format("PC2 point cache", (".pc2",), "point_caches:write_pc2"),
+    "mdd": Format("MDD point cache", (".mdd",), "point_caches:write_mdd"),
+    "npy": Format("NumPy frames (.npy)", (".npy",), "point_caches:write_npy"),
+    "obj": Format("OBJ, a file a frame", (), "folders:write_obj_frames"),
+    "ply": Format("PLY, a file a frame", (), "folders:write_ply_frames"),
 }
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import InputError
+from toolkit.export import FORMATS
 from toolkit.progress import Progress
 from viewer.modes.base import Mode
 from viewer.stages_process import export_in_process
@@ -16,17 +17,6 @@ if TYPE_CHECKING:
     from viewer.state.app import App
 
 __all__ = ["ExportMode"]
-
-_FORMATS = (
-    ("gltf", "glTF (.glb): bases as morph targets"),
-    ("usd", "USD (.usdc)"),
-    ("abc", "Alembic (.abc)"),
-    ("pc2", "PC2 point cache"),
-    ("mdd", "MDD point cache"),
-    ("npy", "NumPy frames (.npy)"),
-    ("obj", "OBJ, a file a frame"),
-    ("ply", "PLY, a file a frame"),
-)
 
 
 class ExportMode(Mode):
@@ -47,7 +37,9 @@ class ExportMode(Mode):
 
     def rows(self) -> Sequence[Row]:
         """Formats, the button, what was written."""
-        rows: list[Row] = [Check(f"format:{name}", words, name in self._chosen) for name, words in _FORMATS]
+        rows: list[Row] = [
+            Check(f"format:{name}", format.words, name in self._chosen) for name, format in FORMATS.items()
+        ]
         ready = self.app.data.has_result and bool(self._chosen) and self.app.worker.progress is None
         rows.append(Button("export now", "Export", ready))
         rows.append(Note(f"into {self.app.shot.export_folder}", "quiet"))
@@ -65,7 +57,7 @@ class ExportMode(Mode):
             self._export()
 
     def _export(self) -> None:
-        formats = [name for name, _ in _FORMATS if name in self._chosen]
+        formats = [name for name in FORMATS if name in self._chosen]
         if not formats:
             raise InputError("no format is chosen", remedy="tick one")
         folder = self.app.shot.path
