@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import sys
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -69,16 +69,9 @@ class ShotConfig:
     details: DetailParameters = field(default_factory=DetailParameters)
 
 
-_STAGES: dict[str, type] = {
-    "stabilise": StabiliseParameters,
-    "register": RegistrationParameters,
-    "smoothing": SmoothingParameters,
-    "bases": BasisParameters,
-    "transfer": TransferParameters,
-    "details": DetailParameters,
+_STAGES: dict[str, Any] = {
+    one.name: one.default_factory for one in fields(ShotConfig) if one.default_factory is not MISSING
 }
-
-
 _KINDS = {int: "a whole number", float: "a number", str: "a word in quotes", bool: "true or false"}
 
 
