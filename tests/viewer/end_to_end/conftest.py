@@ -104,6 +104,12 @@ class Desk:
         command = ["xdotool", *map(str, words)]
         return subprocess.run(command, env=self._environment, check=True, capture_output=True, text=True).stdout
 
+    def enter(self, key: str, mode: str, widget: str = "") -> None:
+        """The mode behind a key, once the shot can be edited; until its panel shows a ``widget``, if one is named."""
+        self.wait(lambda state: state["editable"])
+        self.key(key)
+        self.wait(lambda state: state["mode"] == mode and (not widget or widget in state["widgets"]))
+
     def move(self, x: float, y: float) -> None:
         self._xdotool("mousemove", "--window", self._window, int(x), int(y))
         time.sleep(0.05)

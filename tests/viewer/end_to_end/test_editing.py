@@ -43,9 +43,7 @@ def mouth_corner(shot: Path, vertices: np.ndarray, desk: Any) -> int:
 def test_a_mouth_corner_is_dragged(shot: Path, sit_down: Callable) -> None:
     data = ShotData(Shot(shot))
     desk = sit_down(shot)
-    desk.wait(lambda state: state["editable"])
-    desk.key("4")
-    desk.wait(lambda state: state["mode"] == "pose")
+    desk.enter("4", "pose")
     desk.key(*["Right"] * 3)
     frame = desk.wait(lambda state: state["frame"] == 3)["frame"]
     corner = mouth_corner(shot, data.result[frame], desk)
@@ -131,9 +129,7 @@ def _export(desk: Any, shot: Path, data: ShotData) -> None:
 def test_a_kill_in_the_middle_of_a_drag_loses_only_the_drag(shot: Path, sit_down: Callable) -> None:
     data = ShotData(Shot(shot))
     desk = sit_down(shot)
-    desk.wait(lambda state: state["editable"])
-    desk.key("4")
-    desk.wait(lambda state: state["mode"] == "pose")
+    desk.enter("4", "pose")
     corner = mouth_corner(shot, data.result[0], desk)
     at = desk.pixel(1, data.result[0][corner], data.target_framing)
     desk.drag(at, (at[0], at[1] - 15))
