@@ -11,6 +11,7 @@ from xxhash import xxh3_128
 
 from toolkit.errors import InputError
 from toolkit.meshio.aside import written_aside
+from toolkit.meshio.companions import companions
 
 __all__ = ["HashCache", "key_of"]
 
@@ -33,12 +34,13 @@ class HashCache:
             self._known = {}  # only a memory: without it files are read again
 
     def of(self, path: Path) -> str:
-        """Hash of a file's bytes, or of a folder's file names and bytes."""
+        """Hash of a file's bytes and of those that belong to it, or of a folder's file names and bytes."""
         if not path.exists():
             raise InputError("there is no such file or folder", where=path, remedy="check the path in shot.toml")
         if path.is_dir():
             return key_of({file.name: self._file(file) for file in sorted(path.iterdir()) if file.is_file()})
-        return self._file(path)
+        others = [self._file(file) for file in companions(path)]
+        return key_of({"file": self._file(path), "others": others}) if others else self._file(path)
 
     def save(self) -> None:
         """Write the memory down."""
