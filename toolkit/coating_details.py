@@ -46,8 +46,7 @@ class CoatingDetails:
         order = target.filter.order
         n = len(order)
         adjacency = sp.csr_matrix(vertex_adjacency(target.mesh.triangles, n)[order][:, order])
-        self._degree = np.asarray(adjacency.sum(axis=1)).ravel()
-        degree = np.maximum(self._degree, 1)
+        degree = np.maximum(np.asarray(adjacency.sum(axis=1)).ravel(), 1)
         self._laplacian = sp.csr_matrix(sp.identity(n) - sp.diags(1 / degree) @ adjacency)
         self._factor = factorise(sp.csc_matrix(sp.diags((1 + screening) * degree) - adjacency))
         self._weights, self._screening = degree, screening
@@ -63,7 +62,7 @@ class CoatingDetails:
         smooth = self._blocked(self._smooth_deltas[start:stop]) + source.rest.smooth[self._order][:, :, None]
         detail = self._blocked(self._details[start:stop]) + source.rest.detail[self._order][:, :, None]
         change = self._local_coating(source, smooth, detail) - self._source_rest
-        frames = self._frames(self._target, points.astype(np.float64))
+        frames = block_frames(points.astype(np.float64), *self._target.block.stencil)
         own = self._target.rest.detail[self._order]
         coating = self._apply(self._laplacian, np.einsum("vijb,vj->vib", frames, own))
         coating += np.einsum("vijb,vjb->vib", frames, self._gain[:, None, None] * change)
@@ -74,13 +73,9 @@ class CoatingDetails:
     def _blocked(self, frames: NDArray[np.float32]) -> Array:
         return np.moveaxis(frames[:, self._order].astype(np.float64), 0, 2)
 
-    def _frames(self, decomposer: Decomposer, points: Array) -> Array:
-        """Local frames ``(V, 3, 3, B)``."""
-        return block_frames(points, *decomposer.block.stencil)
-
     def _local_coating(self, decomposer: Decomposer, points: Array, detail: Array) -> Array:
         """``F^T L (F detail)``, ``(V, 3, B)``."""
-        frames = self._frames(decomposer, np.ascontiguousarray(points))
+        frames = block_frames(np.ascontiguousarray(points), *decomposer.block.stencil)
         coating = self._apply(self._laplacian, np.einsum("vijb,vjb->vib", frames, detail))
         return np.einsum("vjib,vjb->vib", frames, coating)
 
