@@ -127,3 +127,9 @@ def test_a_large_file_is_read_quickly(tmp_path):
     back = read_mesh(tmp_path / "large.obj")
     assert time.perf_counter() - start < 3  # 0.15 s on a quiet machine; a line-by-line parser needs seconds
     np.testing.assert_array_equal(back.triangles, mesh.triangles)
+
+
+def test_a_byte_order_mark_does_not_hide_the_first_vertex(tmp_path):
+    path = obj(tmp_path, "v 1 2 3\nv 1 0 0\nv 0 1 0\nv 4 4 4\nf 1 2 3\n".encode("utf-8-sig"))
+    assert read_mesh(path).vertices[0].tolist() == [1, 2, 3]
+    assert len(read_obj_positions(path)) == 4

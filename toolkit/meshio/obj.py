@@ -97,7 +97,8 @@ class _Lines:
 
     @classmethod
     def of(cls, data: bytes) -> _Lines:
-        """The lines of a file, continued ones joined; any line ends."""
+        """The lines of a file, continued ones joined; any line ends, and a byte order mark or none."""
+        data = data.removeprefix(b"\xef\xbb\xbf")
         if b"\r" in data and b"\n" not in data:
             data = data.replace(b"\r", b"\n")
         if b"\\\n" in data or b"\\\r\n" in data:
