@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from _cli import parser_for, run
@@ -110,7 +111,7 @@ def _take_up(
         told.append(_told(edit, session))
         number = None
     files = [] if options.preview is None else _pictures(session, options.preview, options, progress)
-    print(f'next: scripts/6_edit.py {options.shot} apply, or "undo"')
+    print(f'next: scripts/6_edit.py {quote(str(options.shot))} apply, or "undo"')
     return {"edits": told, "files": files}
 
 

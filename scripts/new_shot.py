@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from _cli import chosen, parser_for, run
@@ -24,7 +25,7 @@ def main(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     folder: Path = options.shot
     named = ("landmarks", "feature_lines", "source_extras", "target_extras", "fps", "force")
     create_shot(folder, options.source_reference, options.frames, options.target, **chosen(options, *named))
-    print(f"made {folder}; next: python scripts/run_all.py {folder}")
+    print(f"made {folder}; next: python scripts/run_all.py {quote(str(folder))}")
     return {"shot": str(folder)}
 
 

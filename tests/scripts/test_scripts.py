@@ -61,6 +61,7 @@ def test_help(name: str) -> None:
 
 def test_from_files_to_exports(bump: TriangleMesh, inputs: dict[str, Path], tmp_path: Path) -> None:
     shot = tmp_path / "shot"
+    assert f"run_all.py '{tmp_path}/my shot'" in new_shot(tmp_path / "my shot", inputs).stdout
     assert new_shot(shot, inputs).returncode == 0
     again = new_shot(shot, inputs)
     assert again.returncode == 2
