@@ -40,19 +40,22 @@ class FrameRows:
         return frames, which
 
     @cached_property
-    def _together(self) -> Array:
-        """Adds up the rows of each frame, (F, R)."""
+    def _matrix(self) -> Array:
+        """``B^T`` but for frames that no row sees, (F K, R)."""
         frames, which = self.distinct
-        return np.equal.outer(np.arange(len(frames)), which).astype(np.float64)
+        n_rows, n_bases = self.local.shape
+        matrix = np.zeros((len(frames), n_bases, n_rows))
+        matrix[which, :, np.arange(n_rows)] = self.local
+        return matrix.reshape(-1, n_rows)
 
     def of(self, change: Array) -> Array:
         """``B u`` (R,)."""
-        return np.asarray(np.einsum("ak,ak->a", self.local, change[self.frames]))
+        return np.asarray(change[self.distinct[0]].ravel() @ self._matrix)
 
     def spread(self, values: Array, like: Array) -> Array:
         """``B^T values`` (n, K)."""
-        result = np.zeros_like(like)
-        result[self.distinct[0]] = self._together @ (values[:, None] * self.local)
+        result = np.zeros(like.shape)
+        result[self.distinct[0]] = (self._matrix @ values).reshape(-1, like.shape[1])
         return result
 
 
