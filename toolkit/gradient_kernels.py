@@ -1,4 +1,4 @@
-"""Compiled loops over triangles for the transfer of deformation gradients (Sumner and Popovic 2004).
+"""Compiled loops for the transfer of deformation gradients (Sumner and Popovic 2004).
 
 ``E = [e0 e1 n]`` are a triangle's edges from its first corner and ``n = e0 x e1 / sqrt(|e0 x e1|)``. Moves of shapes
 are ``(V, 3, K)``, the shapes innermost, so that the compiler vectorises over them.

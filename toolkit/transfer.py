@@ -142,7 +142,7 @@ class DeformationTransfer:
     def _line_weight(self, parameters: TransferParameters, n_triangles: int) -> float:
         weight = parameters.line_weight
         if weight is None:
-            weight = 100.0 if not len(self.pairs) else 10.0
+            weight = 10.0 if len(self.pairs) else 100.0
         # Triangles grow with the square of the resolution, edges of a line with the resolution.
         return float(weight * np.sqrt(n_triangles / _PAPER_TRIANGLES))
 
