@@ -53,13 +53,10 @@ _OFF, _RADIUS, _SAMPLED = 0.8, 1.2, 1500
 
 @dataclass(frozen=True)
 class Floor:
-    """The best smooth answer in hindsight, ``vertices`` (V, 3), its mean error, and what it was found with."""
+    """The best smooth answer in hindsight, ``vertices`` (V, 3), and its mean error."""
 
     vertices: Array
     error: float
-    stiffness: float
-    stretching: float
-    blend: float
 
 
 def floor(
@@ -102,7 +99,7 @@ def floor(
                 for name, mask in regions.items():
                     mean = float(error[mask].mean())
                     if name not in best or mean < best[name].error:
-                        best[name] = Floor(found, mean, stiffness, stretching, blend)
+                        best[name] = Floor(found, mean)
     return best
 
 

@@ -38,13 +38,12 @@ class MotionError:
     """Error of a result relative to the motion of the known answer.
 
     ``relative`` RMS of ``|result - truth|`` over RMS of ``|truth - rest|``, all frames and vertices; ``rms`` and
-    ``largest`` the error in mesh units; ``per_frame`` (T,) RMS in mesh units.
+    ``largest`` the error in mesh units.
     """
 
     relative: float
     rms: float
     largest: float
-    per_frame: Array
 
 
 def motion_error(
@@ -61,7 +60,7 @@ def motion_error(
         largest = max(largest, float(squared.max()))
     rms = float(np.sqrt(np.mean(errors)))
     relative = rms / max(float(np.sqrt(np.mean(motions))), 1e-300)
-    return MotionError(relative, rms, float(np.sqrt(largest)), np.sqrt(errors))
+    return MotionError(relative, rms, float(np.sqrt(largest)))
 
 
 @dataclass(frozen=True)

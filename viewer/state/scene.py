@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -170,11 +169,6 @@ class Scene:
     def pick(self, pane: int, x: float, y: float) -> Hit | None:
         """What a pixel of a pane shows."""
         return self.picker(pane).pick(self.framing_camera(pane), x, y, self.pane_sizes[pane])
-
-    def pixel(self, pane: int, position: Sequence[float]) -> tuple[float, float]:
-        """Where a place is seen in a pane, in its pixels."""
-        x, y, _ = self.framing_camera(pane).project(np.asarray(position)[None], self.pane_sizes[pane])[0]
-        return float(x), float(y)
 
 
 def _owned(vertices: NDArray[np.floating]) -> NDArray[np.float32]:

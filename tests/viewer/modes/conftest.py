@@ -61,8 +61,12 @@ class Hand:
             self.app.worker.wait(30)
             self.app.tick(0.0)
 
+    def pixel(self, place: np.ndarray, pane: int = 1) -> tuple[float, float]:
+        x, y, _ = self.app.framing_camera(pane).project(np.asarray(place)[None], self.SIZE)[0]
+        return float(x), float(y)
+
     def pixel_of(self, vertex: int, pane: int = 1) -> tuple[float, float]:
-        return self.app.pixel(pane, self.app.surface(pane).vertices[vertex])
+        return self.pixel(self.app.surface(pane).vertices[vertex], pane)
 
     def event(self, kind: str, x: float, y: float, pane: int = 1, **more) -> Pointer:
         camera = self.app.framing_camera(pane)

@@ -197,7 +197,7 @@ def test_a_copy_is_placed_by_the_pointer_and_turned_by_the_knob(detail) -> None:
     assert np.linalg.norm(rest[np.argmax(apart)] - rest[goal]) < 4
 
     ring = mode.ring(1)
-    detail.drag(app.pixel(1, ring.knob(0, 1)), app.pixel(1, ring.knob(70, 1.4)))
+    detail.drag(detail.pixel(ring.knob(0, 1)), detail.pixel(ring.knob(70, 1.4)))
     assert mode.draft.rotation == pytest.approx(70, abs=3)
     assert mode.draft.scale == pytest.approx(1.4, abs=0.05)
     discs = [mark for mark in mode.marks(1) if isinstance(mark, Disc)]

@@ -260,7 +260,7 @@ def test_the_wheel_zooms_to_what_the_pointer_is_over(hand) -> None:
     under = origin + (middle - origin) @ toward / (direction @ toward) * direction
     app.handle(event)
     assert app.views[1].distance < 2
-    assert app.pixel(1, under) == pytest.approx(at, abs=0.1)
+    assert hand.pixel(under) == pytest.approx(at, abs=0.1)
 
 
 def test_the_brushes_ring_lies_on_the_face_and_does_not_fall_off_it(pose) -> None:
