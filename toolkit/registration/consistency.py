@@ -22,32 +22,21 @@ Correct sets reach 0.2 to 0.5 between humans and 1.2 between a human and a dog; 
 one pair misplaced by a fifth of the face 0.7 to 5."""
 
 
-def refuse_contradictions(
-    landmarks: Landmarks, source: Array, target: Array, *, where: object = "landmarks"
-) -> list[str]:
+def refuse_contradictions(landmarks: Landmarks, source: Array, target: Array) -> list[str]:
     """Refuse landmarks that contradict each other, and return sentences about those that may do harm.
+
+    The pair that fits the others least is taken out, while one stands out.
 
     Parameters
     ----------
     landmarks : pairs that `toolkit.checks.check_landmarks` finds no fault with
     source, target : (V, 3) and (V', 3) vertices of the two meshes
-    where : the file they come from, for the messages
 
     Raises
     ------
     RegistrationError : pairs that contradict the others; the worst are named
     """
-    return _contradictions(landmarks.names, source[landmarks.source], target[landmarks.target], where)
-
-
-def misfit(p: Array, q: Array) -> float:
-    """RMS residual of the best similarity from ``p`` to ``q`` (N, 3), as a share of the extent of ``q``."""
-    gaps = umeyama(p, q).apply(p) - q
-    return float(np.sqrt(np.mean(np.sum(gaps**2, axis=1)))) / extent(q)
-
-
-def _contradictions(names: tuple[str, ...], p: Array, q: Array, where: object) -> list[str]:
-    """Take out the pair that fits the others least, while one stands out; refuse if any did."""
+    names, p, q = landmarks.names, source[landmarks.source], target[landmarks.target]
     keep = np.arange(len(p))
     out: list[int] = []
     doubts: list[str] = []
@@ -63,12 +52,18 @@ def _contradictions(names: tuple[str, ...], p: Array, q: Array, where: object) -
         out.append(int(keep[_culprit(p[keep], q[keep], share)]))
         keep = np.setdiff1d(keep, out)
     if out:
-        raise _contradiction(names, p, q, keep, out, where)
+        raise _contradiction(names, p, q, keep, out)
     return doubts
 
 
+def misfit(p: Array, q: Array) -> float:
+    """RMS residual of the best similarity from ``p`` to ``q`` (N, 3), as a share of the extent of ``q``."""
+    gaps = umeyama(p, q).apply(p) - q
+    return float(np.sqrt(np.mean(np.sum(gaps**2, axis=1)))) / extent(q)
+
+
 def _contradiction(
-    names: tuple[str, ...], p: Array, q: Array, keep: NDArray[np.integer], out: list[int], where: object
+    names: tuple[str, ...], p: Array, q: Array, keep: NDArray[np.integer], out: list[int]
 ) -> RegistrationError:
     spline = ThinPlateSpline(p[keep], q[keep])
     gaps = np.linalg.norm(spline(p[out])[:, None] - q[out][None], axis=2)  # (from, to)
@@ -76,10 +71,10 @@ def _contradiction(
         for j in range(i + 1, len(out)):
             if gaps[i, j] + gaps[j, i] < 0.4 * (gaps[i, i] + gaps[j, j]):
                 what = f"{names[out[i]]!r} and {names[out[j]]!r} are exchanged on one of the faces"
-                return RegistrationError(what, where=where, remedy="exchange their vertices on one face")
+                return RegistrationError(what, where="landmarks", remedy="exchange their vertices on one face")
     told = ", ".join(f"{names[k]!r} {gaps[i, i] / extent(q):.0%}" for i, k in enumerate(out[:3]))
     what = f"landmarks contradict each other: from where the others put them, by the face's extent, are {told}"
-    return RegistrationError(what, where=where, remedy="look at these pairs on both faces; move or delete them")
+    return RegistrationError(what, where="landmarks", remedy="look at these pairs on both faces; move or delete them")
 
 
 def _missed(p: Array, q: Array) -> tuple[Array, Array]:

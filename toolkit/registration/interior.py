@@ -64,7 +64,7 @@ def behind_loops(mesh: TriangleMesh, loops: Sequence[NDArray[np.integer]]) -> Ma
     return _all_but_largest(sp.csr_matrix(cut), np.where(on_loop, 0.0, _areas(mesh))) & ~on_loop
 
 
-def exposure(mesh: TriangleMesh, n_rays: int = _RAYS) -> Array:
+def exposure(mesh: TriangleMesh) -> Array:
     """Share ``(V,)`` of the sky over each vertex, cosine-weighted, that is not hidden by the mesh itself.
 
     Deterministic: the same directions for every vertex, those of a spherical Fibonacci set above its tangent plane.
@@ -78,7 +78,7 @@ def exposure(mesh: TriangleMesh, n_rays: int = _RAYS) -> Array:
     normals = vertex_normals(mesh.vertices, mesh.triangles).astype(np.float32)
     start = points + np.float32(1e-4) * normals
     seen, whole = np.zeros(len(points)), np.zeros(len(points))
-    for direction in _fibonacci_sphere(n_rays).astype(np.float32):
+    for direction in _fibonacci_sphere(_RAYS).astype(np.float32):
         cosine = normals @ direction
         up = np.flatnonzero(cosine > 0)
         rays = np.concatenate([start[up], np.broadcast_to(direction, (len(up), 3))], axis=1)
