@@ -8,6 +8,7 @@ what the shots have in common. A shot that is not there is made; one that is the
     source_reference = "matt/neutral.obj"
     frames = "matt/take"
     feature_lines = "matt/lines.json"
+    source_extras = ["matt/eyes.ply"]
     fps = 30
 
     [[shot]]
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
     from toolkit.stages.blocks import MapBlocks
 
 PATHS = ("source_reference", "frames", "target", "landmarks", "feature_lines")
+EXTRAS = ("source_extras", "target_extras")
+_KINDS: dict[str, Any] = {"folder": str, "fps": (int, float)} | dict.fromkeys(PATHS, str) | dict.fromkeys(EXTRAS, list)
 
 
 @dataclass
@@ -98,18 +101,23 @@ def _listed(path: Path) -> list[Entry]:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"this is not TOML ({error})", where=path, remedy="see batch.py --help for a list") from None
     defaults, shots = data.get("defaults", {}), data.get("shot", [])
-    if not isinstance(defaults, dict) or not isinstance(shots, list) or not shots or set(data) - {"defaults", "shot"}:
+    tables = isinstance(defaults, dict) and isinstance(shots, list) and all(isinstance(shot, dict) for shot in shots)
+    if not tables or not shots or set(data) - {"defaults", "shot"}:
         raise InputError("a list has [[shot]] tables, and [defaults]", where=path, remedy="see batch.py --help")
     return [_entry({**defaults, **shot}, path) for shot in shots]
 
 
 def _entry(table: dict[str, Any], path: Path) -> Entry:
-    unknown = set(table) - {"folder", "fps", *PATHS}
-    if unknown or not isinstance(table.get("folder"), str):
+    unknown = set(table) - set(_KINDS)
+    if unknown or "folder" not in table:
         what = f"there is no key {min(unknown)!r} of a shot" if unknown else "a shot has no folder"
-        raise InputError(what, where=path, remedy=f"known are folder, fps, {', '.join(PATHS)}")
-    inputs = {key: path.parent / str(table[key]) for key in PATHS if key in table} | {"fps": table.get("fps")}
-    return Entry(path.parent / table["folder"], inputs)
+        raise InputError(what, where=path, remedy=f"known are {', '.join(_KINDS)}")
+    for key, value in table.items():
+        if not isinstance(value, _KINDS[key]):
+            raise InputError(f"{key} = {value!r} is of the wrong kind", where=path, remedy="see batch.py --help")
+    inputs: dict[str, Any] = {key: path.parent / table[key] for key in PATHS if key in table}
+    inputs |= {key: [path.parent / str(name) for name in table[key]] for key in EXTRAS if key in table}
+    return Entry(path.parent / table["folder"], inputs | {"fps": table.get("fps")})
 
 
 def _make(entry: Entry) -> None:

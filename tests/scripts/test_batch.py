@@ -12,6 +12,7 @@ import pytest
 
 from toolkit.mesh import TriangleMesh
 from toolkit.meshio import write_mesh
+from toolkit.shot import Shot
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -28,7 +29,7 @@ def listed(bump: TriangleMesh, take: np.ndarray, tmp_path: Path) -> Path:
     np.save(tmp_path / "take.npy", take.astype(np.float32))
     for name, size in (("tall", [1, 1.3, 1]), ("wide", [1.2, 1, 1])):
         write_mesh(tmp_path / f"{name}.ply", bump.with_vertices(bump.vertices * size))
-    text = '[defaults]\nsource_reference = "source.ply"\nframes = "take.npy"\nfps = 30\n'
+    text = '[defaults]\nsource_reference = "source.ply"\nframes = "take.npy"\nfps = 30\nsource_extras = ["tall.ply"]\n'
     for name in ("tall", "gone", "wide"):
         text += f'[[shot]]\nfolder = "shots/{name}"\ntarget = "{name}.ply"\n'
     (tmp_path / "list.toml").write_text(text)
@@ -45,6 +46,7 @@ def test_a_failure_is_noted_and_the_rest_goes_on(listed: Path) -> None:
     shots = listed.parent / "shots"
     kept = [(shots / name / "stages" / "decompose" / "details.npy").stat() for name in ("tall", "wide")]
     assert kept[0].st_ino == kept[1].st_ino, "one performance is taken apart once"
+    assert Shot(shots / "tall").config.source.extras == (listed.parent.resolve() / "tall.ply",)
     frames = [np.load(shots / name / "result" / "frames.npy") for name in ("tall", "wide")]
     assert np.abs(frames[0] - frames[1]).max() > 0.1
 
@@ -62,6 +64,9 @@ def test_a_failure_is_noted_and_the_rest_goes_on(listed: Path) -> None:
         ('[[shot]]\nfolder = "a"\ntraget = "b"\n', "traget"),
         ('[[shot]]\ntarget = "b"\n', "no folder"),
         ("[defaults]\nfps = 30\n", "[[shot]]"),
+        ("shot = [1]\n", "[[shot]]"),
+        ('[[shot]]\nfolder = "a"\nfps = "thirty"\n', "fps = 'thirty' is of the wrong kind"),
+        ('[[shot]]\nfolder = "a"\ntarget_extras = "eyes.ply"\n', "target_extras = 'eyes.ply' is of the wrong kind"),
         ("[[shot", "not TOML"),
     ],
 )
