@@ -39,10 +39,9 @@ class IctPair:
         vector = self._neutral[self.performer.edges[:, 1]] - self._neutral[self.performer.edges[:, 0]]
         self._rest_length = np.linalg.norm(vector, axis=1)
 
-    def source(self, weights: Array | None = None) -> TriangleMesh:
-        """The performer, at rest or in an expression."""
-        at_rest = np.zeros(self.weights.shape[1])
-        return TriangleMesh(self.performer.frame(at_rest if weights is None else weights), self.triangles)
+    def source(self) -> TriangleMesh:
+        """The performer at rest."""
+        return TriangleMesh(self.performer.frame(np.zeros(self.weights.shape[1])), self.triangles)
 
     def target(self) -> TriangleMesh:
         """The other person at rest."""

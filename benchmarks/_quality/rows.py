@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import textwrap
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -56,19 +57,10 @@ def _judged(name: str, value: float, goal: float, unit: str, sign: str) -> Row:
 def table(section: Section) -> str:
     """The section as aligned text."""
     width = max((len(row.name) for row in section.rows), default=0)
-    lines = ["", section.name.upper(), *_wrapped(section.about)]
+    about = textwrap.wrap(section.about, 110, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
+    lines = ["", section.name.upper(), *about, ""]
     for row in section.rows:
         value = f"{row.value:.4g} {row.unit}".strip()
         mark = "" if row.passed is None else ("PASS" if row.passed else "FAIL")
         lines.append(f"  {row.name:<{width}}  {value:>14}  {row.goal or '':>10}  {mark}".rstrip())
     return "\n".join(lines)
-
-
-def _wrapped(text: str, width: int = 110) -> list[str]:
-    lines, line = [], "  "
-    for word in text.split():
-        if len(line) + len(word) > width:
-            lines.append(line.rstrip())
-            line = "  "
-        line += word + " "
-    return [*lines, line.rstrip(), ""]

@@ -17,7 +17,6 @@ from toolkit.errors import InputError
 from toolkit.feature_lines import FeatureLine, load_feature_lines, trace_lines
 from toolkit.mesh import TriangleMesh
 from toolkit.meshio import read_mesh
-from toolkit.progress import Progress, silent
 
 __all__ = ["LEVELS", "PerformerAt", "performer_at", "split_longest_edges"]
 
@@ -40,7 +39,7 @@ class PerformerAt:
         """The feature lines along this mesh's edges; the sample's vertices keep their ids."""
         return trace_lines(load_feature_lines(self.paths.feature_lines), self.mesh.vertices, self.mesh.triangles)
 
-    def write_take(self, path: Path, n_frames: int, progress: Progress = silent) -> None:
+    def write_take(self, path: Path, n_frames: int) -> None:
         """Write ``(T, V, 3)`` float32: the sample's performance, wrinkles and head motion included, in so many frames.
 
         Frames between two of the sample's are interpolated.
@@ -57,12 +56,11 @@ class PerformerAt:
             frames = sample[first] + share * (sample[first + 1] - sample[first])
             columns = frames.transpose(1, 0, 2).reshape(frames.shape[1], -1)
             take[start : start + len(at)] = (self.resample @ columns).reshape(-1, len(at), 3).transpose(1, 0, 2)
-            progress("writing the take", start + len(at), n_frames)
         take.flush()
 
 
 @lru_cache(maxsize=1)  # a large one takes a gigabyte
-def performer_at(n_vertices: int, progress: Progress = silent) -> PerformerAt:
+def performer_at(n_vertices: int) -> PerformerAt:
     """The performer with ``n_vertices``: the sample's level below, subdivided, then its longest edges split.
 
     From 275,000 vertices on the surface is Catmull-Clark's of the finest sample. The last one is kept.
@@ -70,7 +68,7 @@ def performer_at(n_vertices: int, progress: Progress = silent) -> PerformerAt:
     if n_vertices < LEVELS[0]:
         raise InputError(f"the performer has at least {LEVELS[0]} vertices, not {n_vertices}", remedy="ask for more")
     level = max(k for k, count in enumerate(LEVELS) if count <= n_vertices)
-    paths = ensure_samples(level=level, targets=(), progress=progress).performer
+    paths = ensure_samples(level=level, targets=()).performer
     mesh = read_mesh(paths.reference)
     triangles: NDArray[np.integer] = mesh.triangles
     resample = sp.identity(mesh.n_vertices, format="csr")
