@@ -7,7 +7,7 @@ one after the other. What couples the weights of a frame makes them one system, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -88,15 +88,11 @@ class FrameBands:
     """``sum_i Q_i (x) S_i``: the weights of a frame together; ``terms`` are pairs of Q (n, n), five bands, S (K, K)."""
 
     def __init__(self, terms: Sequence[tuple[sp.csr_matrix, Array]]) -> None:
-        n, n_bases = terms[0][0].shape[0], len(terms[0][1])
-        # Each weight's column, (n, K, 3 K), from the first weight of its frame on; then from the diagonal on.
-        columns = sum(np.einsum("jt,kl->tkjl", _diagonals(time), small) for time, small in terms)
-        columns = np.reshape(columns, (n, n_bases, 3 * n_bases))
-        lower = np.zeros_like(columns)
-        for k in range(n_bases):
-            lower[:, k, : 3 * n_bases - k] = columns[:, k, k:]
-        width = 1 + int(np.flatnonzero(lower.any(axis=(0, 1))).max(initial=0))
-        self._lower = np.ascontiguousarray(lower[:, :, :width])
+        pieces = [piece for time, small in terms for piece in _pieces(time, small)]
+        width = max((first + len(across) for _, first, _, across in pieces), default=1)
+        self._lower = np.zeros((terms[0][0].shape[0], len(terms[0][1]), width))
+        for k, first, along, across in pieces:
+            self._lower[:, k, first : first + len(across)] += along[:, None] * across
 
     @property
     def diagonal(self) -> Array:
@@ -123,6 +119,16 @@ def _diagonals(time: sp.csr_matrix) -> Array:
     """The diagonal and the two below it, (3, n)."""
     n = time.shape[0]
     return np.stack([np.pad(time.diagonal(-offset), (0, min(offset, n))) for offset in range(3)])
+
+
+def _pieces(time: sp.csr_matrix, small: Array) -> Iterator[tuple[int, int, Array, Array]]:
+    """Lower bands of ``time (x) small``: a weight, the first band, what varies over frames (n,) and over bands (m,)."""
+    for step, along in enumerate(_diagonals(time)):
+        for k, row in enumerate(small):
+            coupled = np.flatnonzero(row)
+            coupled = coupled if step else coupled[coupled >= k]
+            if len(coupled) and along.any():
+                yield k, step * len(small) + coupled[0] - k, along, row[coupled[0] : coupled[-1] + 1]
 
 
 class _Chains:
