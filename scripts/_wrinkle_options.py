@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from os.path import relpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -150,6 +151,11 @@ def wrinkle_of(options: argparse.Namespace, session: EditSession) -> DetailEdit:
     return ReshapeEdit(curve=curve, goal=goal, **common)
 
 
+def _seen_from(shot: Path, text: str) -> str:
+    """A relative path, which a shell means from where one is, as the journal holds it: both can move together."""
+    return text if Path(text).is_absolute() else relpath(Path(text).resolve(), shot.resolve())
+
+
 def _copy(options: argparse.Namespace, session: EditSession, common: dict[str, Any]) -> DetailEdit:
     from toolkit.detail_edit import PasteEdit, middle_of
 
@@ -158,6 +164,8 @@ def _copy(options: argparse.Namespace, session: EditSession, common: dict[str, A
         raise InputError(
             "nothing is asked for", remedy="give --scale, --remove, --paste-to, --mirror, --reshape-to or --gain"
         )
+    if options.source_shot is not None:
+        copied["source_shot"] = _seen_from(session.shot.path, options.source_shot)
     surface = session.detail_take.surface
     start = middle_of(surface, common["region"]) if options.start is None else surface.at_vertex(options.start)
     goal = None if options.paste_to is None else surface.at_vertex(options.paste_to)

@@ -157,7 +157,9 @@ def test_regions_are_selected_kept_and_used_again(shot: Path, tmp_path: Path, ed
     assert "the region is empty" in edit(shot, "region", "none", code=2)["error"]
 
 
-def test_all_that_can_be_done_to_a_wrinkle(shot: Path, tmp_path: Path, edit: Edit) -> None:
+def test_all_that_can_be_done_to_a_wrinkle(
+    shot: Path, tmp_path: Path, edit: Edit, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shutil.copytree(shot, tmp_path / "another")
     region = ["--frame", 7, "--brush", f"{MIDDLE + 4}=12%"]
 
@@ -185,13 +187,18 @@ def test_all_that_can_be_done_to_a_wrinkle(shot: Path, tmp_path: Path, edit: Edi
     assert (earlier["frame"], earlier["source_frame"], earlier["hold"]) == (9, 7, True)
     other, _ = data(*region, "--paste-to", MIDDLE - 62, "--source-shot", tmp_path / "another")
     assert other["source_shot"] == str(tmp_path / "another")
+    with monkeypatch.context() as patch:
+        patch.chdir(tmp_path)  # a relative one is meant from here
+        beside, _ = data(*region, "--paste-to", MIDDLE - 62, "--source-shot", "another")
+    assert (shot / beside["source_shot"]).resolve() == (tmp_path / "another").resolve()
+    assert not Path(beside["source_shot"]).is_absolute()
     own, said = data(*region, "--static", "--remove")
     assert own["details"] == "static"
     assert said["moved_frames"] == 40
     gains, _ = data("--brush", f"{MIDDLE}=12%", "--gain", "0=1,7=0.2,12=1")
     assert gains["gains"] == [[0, 1.0], [7, 0.2], [12, 1.0]]
     assert len(gains["region"]["vertices"]) > 10
-    assert len(edit(shot, "list")["edits"]) == 8
+    assert len(edit(shot, "list")["edits"]) == 9
     assert "nothing is asked for" in edit(shot, "wrinkle", *region, code=2)["error"]
 
 
