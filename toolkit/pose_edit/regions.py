@@ -10,14 +10,19 @@ from scipy.spatial import cKDTree
 
 from toolkit.errors import InputError
 
-__all__ = ["vertices_beyond"]
+__all__ = ["distance_from", "vertices_beyond"]
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
 
 
 def vertices_beyond(vertices: Array, graph: sp.csr_matrix, start: NDArray[np.integer], distance: float) -> Ids:
-    """Vertices farther than ``distance`` from the ``start`` vertices, sorted.
+    """Vertices farther than ``distance`` from the ``start`` vertices, sorted; see `distance_from`."""
+    return np.flatnonzero(distance_from(vertices, graph, start) > distance)
+
+
+def distance_from(vertices: Array, graph: sp.csr_matrix, start: NDArray[np.integer]) -> Array:
+    """Distance of each vertex (V,) to the nearest of the ``start`` vertices, in mesh units.
 
     Along the edges of the mesh (`toolkit.mesh.edge_graph`), so that the upper lip is far from the lower one; parts that
     no edges join to the start, as eyes and teeth, as the crow flies.
@@ -29,4 +34,4 @@ def vertices_beyond(vertices: Array, graph: sp.csr_matrix, start: NDArray[np.int
     apart = np.flatnonzero(np.isinf(along))
     if len(apart):
         along[apart] = cKDTree(vertices[start]).query(vertices[apart])[0]
-    return np.flatnonzero(along > distance)
+    return np.asarray(along)

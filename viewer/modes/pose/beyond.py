@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import dijkstra
 
 from toolkit.mesh import edge_graph, unique_edges
 from toolkit.pose_edit.constraints import handled_vertices
+from toolkit.pose_edit.regions import distance_from
 from toolkit.progress import Progress
 from viewer.modes.pose.draft import PoseDraft
 
@@ -20,7 +20,7 @@ __all__ = ["Beyond"]
 
 
 class Beyond:
-    """Measures in the worker, along the edges of the rest shape as the solver does; keeps the last answer."""
+    """Measures in the worker, on the rest shape as the solver does; keeps the last answer."""
 
     def __init__(self, app: App) -> None:
         self._app = app
@@ -45,8 +45,7 @@ class Beyond:
             graph = self._graph
             if graph is None:
                 graph = edge_graph(rest, unique_edges(session.triangles))
-            along = dijkstra(graph, indices=list(vertices), min_only=True)
-            return graph, along.astype(np.float32)
+            return graph, distance_from(rest, graph, np.array(vertices)).astype(np.float32)
 
         def done(found: tuple[Any, NDArray[np.float32]]) -> None:
             self._graph, self.distance = found
