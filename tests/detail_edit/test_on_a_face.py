@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from data.heads import build_head
 from data.layout import LEVELS, hand_made, load_layout
-from data.package import Package, default_cache, ensure_wheel
+from data.package import Package
 from data.performer import PERFORMER
 from data.remeshing import split_quads
 from toolkit.decomposition import frame_neighbours
@@ -30,7 +31,6 @@ from toolkit.detail_edit import (
     within,
 )
 from toolkit.detail_edit.flatten import minimal_turn
-from toolkit.errors import InputError
 from toolkit.mesh import TriangleMesh
 from toolkit.mesh.geometry import local_frames
 
@@ -39,12 +39,9 @@ LINE = [(-5.0, 3.9), (-3.5, 4.35), (-1.8, 4.25)]
 
 
 @pytest.fixture(scope="module")
-def face() -> DetailTake:
+def face(wheel: Path) -> DetailTake:
     """The sample performer's skin, 68,949 vertices, with two wrinkles on its forehead in the middle one of 3 frames."""
-    try:
-        package = Package(ensure_wheel(default_cache()))
-    except InputError as error:
-        pytest.skip(f"the samples' package can't be had: {error}")
+    package = Package(wheel)
     layout = load_layout(package)
     rest = layout.subdivision.matrix @ build_head(package, PERFORMER).neutral
     mesh = TriangleMesh(rest, split_quads(layout.quads(LEVELS)))

