@@ -104,7 +104,6 @@ class SmoothingFilter:
         triangles: NDArray[np.integer],
         n_vertices: int,
         parameters: SmoothingParameters,
-        steps: int | None = None,
     ) -> None:
         average = smoothing_average(triangles, n_vertices)
         self.order = np.ascontiguousarray(reverse_cuthill_mckee(average, symmetric_mode=False), dtype=np.int64)
