@@ -1,10 +1,21 @@
-"""Options that the scripts which render have in common."""
+"""What the scripts which render have in common: options, and a word about results that are old."""
 
 from __future__ import annotations
 
 import argparse
+import logging
+from contextlib import suppress
+from shlex import quote
+from typing import TYPE_CHECKING
 
-__all__ = ["add_axes", "numbers_list", "positive", "positive_number", "vector"]
+from toolkit.errors import InputError
+
+if TYPE_CHECKING:
+    from toolkit.shot import Shot
+
+__all__ = ["add_axes", "numbers_list", "positive", "positive_number", "vector", "warn_of_old_result"]
+
+log = logging.getLogger(__name__)
 
 
 def add_axes(parser: argparse._ActionsContainer) -> None:
@@ -15,6 +26,16 @@ def add_axes(parser: argparse._ActionsContainer) -> None:
     parser.add_argument(
         "--up", type=vector, default=(0.0, 1.0, 0.0), metavar="X,Y,Z", help="up in the source's files (0,1,0)"
     )
+
+
+def warn_of_old_result(shot: Shot) -> None:
+    """Say in the log that the result does not follow the shot's files, parameters or edits any more, if it does not."""
+    from toolkit.stages.run import current_key
+
+    with suppress(InputError):  # its files are gone: the result is what there is
+        if shot.frames_path.exists() and not shot.is_current("result", current_key(shot, "result")):
+            what = "%s: the result is older than the shot's files, parameters or edits; scripts/run_all.py %s renews it"
+            log.warning(what, shot.path, quote(str(shot.path)))
 
 
 def vector(text: str) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from _cli import parser_for, run
-from _views import add_axes, numbers_list, positive, positive_number
+from _views import add_axes, numbers_list, positive, positive_number, warn_of_old_result
 
 from toolkit.errors import InputError
 from toolkit.progress import Progress
@@ -31,6 +31,8 @@ def main(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     from toolkit.shot import Shot
 
     shots = [Shot(path) for path in options.shots]
+    for shot in shots:
+        warn_of_old_result(shot)
     opened = [open_views(shot, forward=options.forward, up=options.up) for shot in shots]
     if len({views.source.n_frames for views in opened}) > 1:
         raise InputError("the shots have takes of different lengths", remedy="render them one at a time")

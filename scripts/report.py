@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from _cli import parser_for, run
-from _views import add_axes, positive
+from _views import add_axes, positive, warn_of_old_result
 
 from toolkit.progress import Progress
 
@@ -22,6 +22,7 @@ def main(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     from toolkit.shot import Shot
 
     shot = Shot(options.shot)
+    warn_of_old_result(shot)
     path = Path(options.out or shot.report_path)
     data = report_data(
         shot, forward=options.forward, up=options.up, frames=options.count, folder=path.parent, progress=progress

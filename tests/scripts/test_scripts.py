@@ -89,6 +89,12 @@ def test_from_files_to_exports(bump: TriangleMesh, inputs: dict[str, Path], tmp_
     assert np.allclose(read_mesh(paths[1]).vertices, 0.1 * rest, atol=1e-6)
     assert np.array_equal(open_sequence(paths[2]).read(3, 4)[0], frames[3])
 
+    look = ("render", shot, "--count", 1, "--width", 60)
+    assert "older" not in script(*look).stderr
+    toml = shot / "shot.toml"
+    toml.write_text(toml.read_text().replace("# gain = 1.0", "gain = 0.5"))
+    assert "the result is older than the shot's files, parameters or edits" in script(*look).stderr
+
 
 def test_bad_input_is_one_sentence(bump: TriangleMesh, inputs: dict[str, Path], tmp_path: Path) -> None:
     shot = tmp_path / "shot"
