@@ -164,7 +164,7 @@ class Reconstruction:
         """``T~_t`` about the origin, ``(V, 3, B)``."""
         weights = self._weights[start:stop]
         points = scratch("points", (len(self._order), 3, len(weights)))
-        shares = np.vstack([weights.T, np.ones_like(weights[:, :1]).T])
+        shares = np.vstack([weights.T, np.ones((1, len(weights)), dtype=np.float32)])
         np.matmul(self._shapes.T, shares, out=points.reshape(-1, len(weights)))
         for change in self._bases_changes:
             share = np.einsum("tk,ukc->uct", weights, change.coefficients).astype(np.float32)

@@ -129,7 +129,7 @@ class DeformationTransfer:
     def contact_pulls(self, goals: Array) -> Array:
         """What goals (K, P, 3) for the contact pairs' gaps add to ``right`` at the pairs' vertices (U,), (U, 3, K)."""
         pull = self._contact_scale * (goals - self.pairs.gaps(self.target)).transpose(1, 2, 0)
-        return np.asarray(self._contacts.T @ _flat(pull)).reshape(-1, *pull.shape[1:])
+        return np.asarray(self._contacts.T @ _flat(pull)).reshape(len(self.pairs.vertices), *pull.shape[1:])
 
     def _contact_rows(self, weight: float) -> sp.csr_matrix:
         rim = self.target[self.pairs.edge[:, 1]] - self.target[self.pairs.edge[:, 0]]
@@ -156,7 +156,7 @@ class DeformationTransfer:
         goals = scale * (line_gradients(before, after, direction) - direction).transpose(1, 2, 0)
         rows = _difference_rows(edges, scale / length, len(self.target))
         ids = np.unique(edges)
-        self.right[ids] += (rows[:, ids].T @ _flat(goals)).reshape(-1, *goals.shape[1:])
+        self.right[ids] += (rows[:, ids].T @ _flat(goals)).reshape(len(ids), *goals.shape[1:])
         return rows
 
 

@@ -42,6 +42,13 @@ def test_without_constraints_nothing_changes(bump: TriangleMesh, face: EditableT
         assert edit.smooth_frame(KEY).tobytes() == face.smooth_frame(KEY).tobytes()
 
 
+def test_without_bases_there_is_nothing_to_edit_by(bump: TriangleMesh, face: EditableTake) -> None:
+    still = replace(face, moves=face.moves[:0], weights=face.weights[:, :0])
+    assert np.array_equal(still.smooth_frame(3), bump.vertices)
+    with pytest.raises(InputError, match="no bases"):
+        PoseEditor(still, bump.triangles).solve([corner_pull(face)])
+
+
 def test_bases_reach_similar_expressions_and_weights_stay_in_the_window(bump: TriangleMesh, face: EditableTake) -> None:
     """The paper's Figure 4."""
     editor, pull = PoseEditor(face, bump.triangles), corner_pull(face)

@@ -84,13 +84,24 @@ def test_default_threshold_leaves_the_bases_residual(bump: TriangleMesh, take: n
     assert errors.max() > 1e-4
 
 
-def test_a_still_take_gives_a_still_result(bump: TriangleMesh, tmp_path: Path) -> None:
-    target = bump.vertices * [1.4, 0.9, 1.2]
-    shot = make_shot(tmp_path, bump, np.repeat(bump.vertices[None], 6, axis=0), target)
+@pytest.mark.parametrize("stabilised", ["true", "false"])
+def test_a_still_take_gives_a_still_result(bump: TriangleMesh, tmp_path: Path, stabilised: str) -> None:
+    """Stabilised, rounding makes a basis of one frame; else there are none at all."""
+    target, still = bump.vertices * [1.4, 0.9, 1.2], bump.with_vertices(bump.vertices.astype(np.float32))
+    extra = f"[stabilise]\nenabled = {stabilised}\n"
+    shot = make_shot(tmp_path, still, np.repeat(still.vertices[None], 6, axis=0), target, extra)
     run_stages(shot)
     frames = np.array(shot.array("result", "frames"))
     assert np.abs(frames - target).max() < 1e-5
     assert np.abs(frames - frames[0]).max() == 0
+
+
+def test_where_no_basis_is_wanted_the_details_move_alone(bump: TriangleMesh, take: np.ndarray, tmp_path: Path) -> None:
+    shot = make_shot(tmp_path, bump, take, bump.vertices, "[bases]\nthreshold = 2.0\n")
+    run_stages(shot)
+    assert shot.array("transfer", "bases").shape == (0, bump.n_vertices, 3)
+    moved = np.array(shot.array("result", "frames")) - bump.vertices
+    assert 0 < np.abs(moved).max() < np.abs(take - bump.vertices).max()
 
 
 def test_only_what_changed_is_run_again(bump: TriangleMesh, take: np.ndarray, tmp_path: Path) -> None:

@@ -80,6 +80,11 @@ class PoseEditor:
         then depends, within the tolerance, on the way there; commit a cold solve. An exception from ``progress``
         cancels and leaves everything as it was. Without constraints the result is the take itself.
         """
+        if self.take.n_bases == 0:
+            raise InputError(
+                "the take has no bases, so there is no motion that a pose could be edited by",
+                remedy="give a lower threshold in [bases] and run the stages again; a still take has none at any",
+            )
         parameters = parameters or EditParameters()
         window = parameters.frames(self.take.n_frames)
         resolved = self._with_ids(constraints)

@@ -118,7 +118,7 @@ class EditableTake:
     def smooth_frame(self, frame: int) -> Array:
         """The smoothed surface of one frame, ``(V, 3)``."""
         weights = self.weights[frame]
-        shape = (weights.astype(self.moves.dtype) @ self.moves.reshape(self.n_bases, -1)).reshape(-1, 3) + self.rest
+        shape = np.tensordot(weights.astype(self.moves.dtype), self.moves, 1) + self.rest
         for edit in self.edits:
             shape = shape + edit.of_frame(weights)
         return np.asarray(shape)
