@@ -101,3 +101,5 @@ def test_a_still_take_needs_no_basis() -> None:
 def test_bad_parameters() -> None:
     with pytest.raises(InputError, match="count = 0"):
         BasisParameters(count=0)
+    with pytest.raises(InputError, match=r"contact_share = -1\.0"):
+        BasisParameters(contact_share=-1.0)

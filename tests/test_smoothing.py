@@ -132,9 +132,11 @@ def test_wavelength_halves_a_wave(wavelength: float) -> None:
     assert ratio == pytest.approx(0.5, abs=0.03)
 
 
-def test_bad_parameters_are_named() -> None:
+def test_bad_parameters_are_named(bump: TriangleMesh) -> None:
     with pytest.raises(InputError, match=r"mu = 0\.2"):
         SmoothingParameters(mu=0.2)
+    with pytest.raises(InputError, match="longer than the face"):
+        SmoothingParameters(wavelength=1e6).resolved(bump)
     with pytest.raises(InputError, match="two edges"):
         parameters_for_wavelength(0.1, 0.2)
 

@@ -50,11 +50,12 @@ class BasisParameters:
 
     def __post_init__(self) -> None:
         wrong = self.threshold < 0 or (self.threshold_length or 0) < 0 or (self.count is not None and self.count < 1)
-        if wrong or self.steadiness < 0:
+        if wrong or self.steadiness < 0 or self.contact_share < 0:
             raise InputError(
                 f"bases with threshold = {self.threshold}, threshold_length = {self.threshold_length}, "
-                f"count = {self.count}, steadiness = {self.steadiness} make no sense",
-                remedy="give non-negative thresholds and steadiness, and a count of at least 1",
+                f"count = {self.count}, contact_share = {self.contact_share}, steadiness = {self.steadiness} make no "
+                "sense",
+                remedy="give a count of at least 1, and nothing negative",
             )
 
 

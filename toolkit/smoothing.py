@@ -65,6 +65,11 @@ class SmoothingParameters:
         """The same filter as steps on this mesh: itself, or what ``wavelength`` asks for."""
         if self.wavelength is None:
             return self
+        if self.wavelength > mesh.diagonal:
+            raise InputError(
+                f"the smoothing wavelength {self.wavelength:g} is longer than the face ({mesh.diagonal:.4g})",
+                remedy="choose one a little longer than the wrinkles, in the unit of the source",
+            )
         ends = mesh.vertices[unique_edges(mesh.triangles)]
         edge = float(np.median(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
         return parameters_for_wavelength(self.wavelength, edge, self.lambda_)
