@@ -44,7 +44,7 @@ class Stage:
 STAGES: dict[str, Stage] = {
     stage.name: stage
     for stage in (
-        Stage("inputs", (), (), inputs.work),
+        Stage("inputs", (), (), inputs.work, version=2),
         Stage("register", ("inputs",), ("register",), register.work, version=2),
         Stage(
             "decompose",
