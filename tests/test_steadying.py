@@ -22,12 +22,18 @@ def one_by_one(frames: np.ndarray, bases: np.ndarray) -> np.ndarray:
     return np.stack([nnls(bases.T, frame)[0] for frame in frames])
 
 
-def test_the_weights_equal_a_direct_solve(take):
+@pytest.mark.parametrize("bend", [0.0, 0.1])
+def test_the_weights_equal_a_direct_solve(take, bend: float):
     frames, bases = take
-    found = steady_weights(bases @ bases.T, frames @ bases.T, one_by_one(frames, bases), 2.0)
-    bend = np.sqrt(2.0) * np.diff(np.eye(len(frames)), n=2, axis=0)
-    matrix = np.concatenate([np.kron(np.eye(len(frames)), bases.T), np.kron(bend, bases.T)])
-    direct = nnls(matrix, np.concatenate([frames.ravel(), (bend @ frames).ravel()]))[0].reshape(found.shape)
+    found = steady_weights(bases @ bases.T, frames @ bases.T, one_by_one(frames, bases), 2.0, bend=bend)
+    second = np.diff(np.eye(len(frames)), n=2, axis=0)
+    sizes = np.diag(np.linalg.norm(bases, axis=1))
+    blocks = [(np.eye(len(frames)), bases.T), (np.sqrt(2.0) * second, bases.T), (np.sqrt(bend) * second, sizes)]
+    matrix = np.concatenate([np.kron(time, shape) for time, shape in blocks])
+    goal = np.concatenate(
+        [frames.ravel(), np.sqrt(2.0) * (second @ frames).ravel(), np.zeros(len(second) * len(sizes))]
+    )
+    direct = nnls(matrix, goal)[0].reshape(found.shape)
     assert found.min() >= 0
     assert np.array_equal(found == 0, direct == 0)
     np.testing.assert_allclose(found, direct, atol=1e-9)
@@ -78,6 +84,30 @@ def test_a_basis_that_is_there_twice_changes_nothing(take):
     alone = steady_weights(bases @ bases.T, frames @ bases.T, one_by_one(frames, bases), 2.0)
     assert found.min() >= 0
     np.testing.assert_allclose(found @ twice, alone @ bases, atol=1e-6)
+
+
+def test_where_weights_can_be_one_thing_or_another_they_are_steady_and_not_rounding_s_choice() -> None:
+    """Four bases, one the sum of two others less the third, but for rounding: on the target it may be anything."""
+    rng = np.random.default_rng(1)
+    t = np.linspace(0, 1, 60)[:, None]
+    corners = rng.normal(size=(3, 80))
+    bases = np.stack([*corners, corners[0] + corners[1] - 0.9 * corners[2]])
+    frames = np.sin(np.pi * t * [1, 0.7, 1.3]) ** 2 @ corners + 0.05 * np.sin(2 * np.pi * t) * rng.normal(size=80)
+    found = []
+    for _ in range(2):
+        noisy = frames * (1 + 1e-7 * rng.normal(size=frames.shape))
+        found.append(
+            [
+                steady_weights(bases @ bases.T, noisy @ bases.T, one_by_one(noisy, bases), 2.0, bend=b)
+                for b in (0.0, 1e-3)
+            ]
+        )
+    (loose, steady), (other_loose, other_steady) = found
+    assert np.abs(loose - other_loose).max() > 1e-2
+    assert np.abs(steady - other_steady).max() < 1e-4
+    assert np.abs(np.diff(steady, n=2, axis=0)).max() < 0.5 * np.abs(np.diff(loose, n=2, axis=0)).max()
+    left = [np.linalg.norm(frames - weights @ bases) for weights in (loose, steady)]
+    assert left[1] < 1.001 * left[0]
 
 
 @pytest.mark.parametrize("n_frames", [3, 4])

@@ -160,8 +160,10 @@ def _steadied(
     """The steadiest weights whose squared errors sum to no more than ``most``, and these errors (T,)."""
     energy = np.diag(gram)
     inner, at_rest = gram[np.ix_(chosen, chosen)], energy <= _AT_REST * energy.max()
+    # What the weights' own bends count: nothing, where nothing is left out.
+    bend = float(squared.sum() / np.trace(positions))
     for strength in steadiness * _WEAKER:
-        steady = steady_weights(inner, gram[:, chosen], weights, float(strength), at_rest)
+        steady = steady_weights(inner, gram[:, chosen], weights, float(strength), at_rest, bend=bend)
         left = _squared_errors(positions, chosen, steady, exact=False)
         if left.sum() <= most:
             return steady, left

@@ -55,7 +55,7 @@ STAGES: dict[str, Stage] = {
             by_frames=True,
             reads=("source_vertices.npy", "source_triangles.npy"),
         ),
-        Stage("bases", ("inputs", "decompose"), ("bases",), bases.work, version=5, reads=("lines.json",)),
+        Stage("bases", ("inputs", "decompose"), ("bases",), bases.work, version=6, reads=("lines.json",)),
         Stage("transfer", ("register", "bases"), ("smoothing", "transfer", "details"), transfer.work, version=3),
         Stage("result", ("transfer",), ("smoothing", "details"), result.work, version=5, by_frames=True),
     )
