@@ -36,7 +36,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @dataclass(frozen=True)
 class Run:
-    """Stages 2 to 5, run anew in a fresh process, after the inputs were read and checked there (``inputs_s``).
+    """Stages 2 to 5 in a fresh process, without an earlier result, after the inputs were checked there (``inputs_s``).
 
     ``own_gb`` is the most memory of its own that the process had (what it allocated), ``peak_gb`` with the pages of
     mapped files that the system gives back when it needs them (GiB); ``own_gb`` is NaN where the system does not tell.
