@@ -8,6 +8,7 @@ import resource
 import shutil
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,16 @@ def _cpu_seconds() -> float:
     return used.ru_utime + used.ru_stime
 
 
+def _peak_memory() -> float:
+    """The most memory that this process had, mapped files included, in bytes."""
+    try:
+        status = Path("/proc/self/status").read_text(encoding="ascii")
+        return 1024.0 * int(next(line for line in status.splitlines() if line.startswith("VmHWM")).split()[1])
+    except OSError:
+        # On Linux this one would begin with what the parent had when it made us.
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1.0 if sys.platform == "darwin" else 1024.0)
+
+
 def substitutions(shot: Shot) -> dict[str, Any]:
     """Time the solves of the bases alone, with a factor of the shot's own system."""
     from toolkit.stages.transfer import open_system
@@ -63,8 +74,7 @@ def main() -> None:
     """Do what is asked for, in the order that a user's process would."""
     task, folder = sys.argv[1:]
     said = (stages if task == "stages" else substitutions)(Shot(folder))
-    unit = 2**30 if sys.platform == "darwin" else 2**20
-    print(json.dumps({**said, "peak_gb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit}))
+    print(json.dumps({**said, "peak_gb": _peak_memory() / 2**30}))
 
 
 if __name__ == "__main__":
