@@ -14,18 +14,16 @@ from threadpoolctl import threadpool_limits
 
 from toolkit.progress import Progress, silent
 
-__all__ = ["FRAMES", "block_ranges", "block_size", "map_blocks", "scratch", "worker_count"]
+__all__ = ["block_ranges", "block_size", "map_blocks", "scratch", "worker_count"]
 
-FRAMES = 16
-"""In a block: with three coordinates each, a row of it is three cache lines of float32."""
 _BLOCK_BYTES = 256 * 2**20
 _CACHE_LINE = 64
 _KEPT = threading.local()
 
 
 def block_size(n_vertices: int) -> int:
-    """Frames in a block: `FRAMES`, fewer where ``(V, 3, 16)`` float32 would pass 256 MB (1.4 million vertices)."""
-    return max(1, min(FRAMES, _BLOCK_BYTES // (12 * max(n_vertices, 1))))
+    """Frames in a block: 16, fewer where ``(V, 3, 16)`` float32 would pass 256 MB (1.4 million vertices)."""
+    return max(1, min(16, _BLOCK_BYTES // (12 * max(n_vertices, 1))))
 
 
 def block_ranges(n_frames: int, size: int) -> Iterator[tuple[int, int]]:

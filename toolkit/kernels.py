@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolkit.blocks import FRAMES
 from toolkit.compiled import ARITHMETIC, LOOPS, njit
 
 __all__ = [
@@ -23,8 +22,6 @@ __all__ = [
 
 # Vertices that are copied frame by frame together, so that whole cache lines are written.
 _TILE = 64
-# Columns of a block, but for the last one of a take.
-_FULL = 3 * FRAMES
 
 
 @njit(**LOOPS)
@@ -131,18 +128,11 @@ def _first_rows(coefficient, first, last, block, current, previous):
 
 @njit(**ARITHMETIC)
 def _average_rows(starts, neighbours, share, own, coefficient, first, last, block, current, previous):
-    """Rows ``first <= i < last`` of ``previous <- coefficient block + own current - share A current - previous``."""
-    # Told how many columns there are, the compiler does without most of the loops over them.
-    if block.shape[1] == _FULL:
-        _average_columns(starts, neighbours, share, own, coefficient, first, last, block, current, previous, _FULL)
-    else:
-        n = block.shape[1]
-        _average_columns(starts, neighbours, share, own, coefficient, first, last, block, current, previous, n)
+    """Rows ``first <= i < last`` of ``previous <- coefficient block + own current - share A current - previous``.
 
-
-@njit(forceinline=True, **ARITHMETIC)
-def _average_columns(starts, neighbours, share, own, coefficient, first, last, block, current, previous, n_columns):
-    """Four neighbours at a time: what is written is then read again a quarter as often."""
+    Four neighbours at a time: what is written is then read again a quarter as often.
+    """
+    n_columns = block.shape[1]
     for i in range(first, last):
         p, stop, s = starts[i], starts[i + 1], share[i]
         if p + 4 <= stop:
