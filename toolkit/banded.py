@@ -139,6 +139,7 @@ class _Chains:
         self._factor = bands
 
     def solve(self, right: Array) -> Array:
+        """For one right-hand side (n, K)."""
         solved = right.copy()
         _substitute_chains(self._factor, solved)
         return solved
@@ -159,6 +160,7 @@ class _Frames:
         self._factor = bands
 
     def solve(self, right: Array) -> Array:
+        """For one right-hand side (n, K)."""
         n, width = self._factor.shape
         solved = np.zeros(n + width)
         solved[:n] = right.ravel()
