@@ -79,7 +79,8 @@ def test_passes_taken_together_are_the_same_passes(rows: sp.csr_matrix, columns:
     share, own = (1 / np.diff(rows.indptr)).astype(np.float32), np.float32(0.3)
     block = np.random.default_rng(2).normal(size=(n, columns)).astype(np.float32)
     coefficients = (0.8 ** np.arange(20)).astype(np.float32)
-    graph = rows.indptr.astype(np.uint32), rows.indices.astype(np.uint32), share, own, coefficients
+    shares = np.stack([share, 2 * share])
+    graph = rows.indptr.astype(np.uint32), rows.indices.astype(np.uint32), shares, own, coefficients
     together, one_by_one, spare = np.empty_like(block), np.empty_like(block), np.empty_like(block)
     chebyshev_of_average(*graph, np.array([0, n]), 1, block, one_by_one, spare)
     bounds = level_bounds(rows)

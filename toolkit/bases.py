@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.blocks import map_blocks, scratch
-from toolkit.compiled import ARITHMETIC, njit
+from toolkit.compiled import ARITHMETIC, inner, njit
 from toolkit.errors import InputError
 from toolkit.progress import Progress, silent
 from toolkit.steadying import steady_weights
@@ -240,11 +240,15 @@ def non_negative_weights(inner: Array, coupling: Array, start: Array | None = No
     scale = np.sqrt(np.maximum(np.diag(inner), 1e-300))
     # In units of each basis' own size, so that one tolerance serves weak and strong ones.
     scaled = inner / np.outer(scale, scale)
-    return _active_sets(scaled, np.ascontiguousarray(coupling / scale), np.ascontiguousarray(start * scale)) / scale
+    weights = np.ascontiguousarray(np.maximum(start, 0) * scale)
+    n_bases = len(inner)
+    room = np.empty((n_bases, n_bases)), np.empty(n_bases), np.empty(n_bases, np.int64), np.empty(n_bases, np.bool_)
+    _active_sets(scaled, np.ascontiguousarray(coupling / scale), weights, room)
+    return weights / scale
 
 
 # Plain loops: what numba brings for arrays and linear algebra takes seconds to compile and to load.
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner(nogil=True, error_model="numpy")
 def _solve_passive(inner, right, passive, root, ids, trial):  # type: ignore[no-untyped-def]  # compiled
     """Least squares on the passive set alone, zero elsewhere, to ``trial``; ``root`` and ``ids`` are scratch."""
     n = 0
@@ -271,7 +275,7 @@ def _solve_passive(inner, right, passive, root, ids, trial):  # type: ignore[no-
         trial[ids[a]] = value / root[a, a]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner(nogil=True, error_model="numpy")
 def _steepest(inner, right, w, passive, tolerance):  # type: ignore[no-untyped-def]  # compiled
     """The active weight whose growth lowers the error most, or -1."""
     best, best_value = -1, tolerance
@@ -286,17 +290,14 @@ def _steepest(inner, right, w, passive, tolerance):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _active_sets(inner, coupling, start):  # type: ignore[no-untyped-def]  # compiled
+def _active_sets(inner, coupling, weights, room):  # type: ignore[no-untyped-def]  # compiled
     n_frames, n_bases = coupling.shape
-    result = np.zeros((n_frames, n_bases))
-    root, trial = np.zeros((n_bases, n_bases)), np.zeros(n_bases)
-    ids, passive = np.zeros(n_bases, np.int64), np.zeros(n_bases, np.bool_)
+    root, trial, ids, passive = room
     for t in range(n_frames):
-        right, w = coupling[t], result[t]
+        right, w = coupling[t], weights[t]
         tolerance = 1e-300
         for k in range(n_bases):
             tolerance = max(tolerance, 1e-10 * abs(right[k]))
-            w[k] = max(start[t, k], 0.0)
             passive[k] = w[k] > 0
         for turn in range(10 * n_bases + 10):
             if turn > 0:
@@ -321,4 +322,3 @@ def _active_sets(inner, coupling, start):  # type: ignore[no-untyped-def]  # com
                     break
         for k in range(n_bases):
             w[k] = max(w[k], 0.0)
-    return result

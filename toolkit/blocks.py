@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from toolkit.progress import Progress, silent
 
-__all__ = ["block_ranges", "block_size", "map_blocks", "scratch", "worker_count"]
+__all__ = ["aligned_empty", "block_ranges", "block_size", "map_blocks", "scratch", "worker_count"]
 
 _BLOCK_BYTES = 256 * 2**20
 _CACHE_LINE = 64
@@ -40,17 +40,18 @@ def worker_count() -> int:
 def scratch(name: str, shape: tuple[int, ...], dtype: DTypeLike = np.float32) -> NDArray:
     """An array with anything in it, which this thread gets again at the next call by that name, shape and type.
 
-    For what a block needs on the way only: new pages for every block take the system as long as a pass over them. It
-    begins on a cache line: vectors of numbers that lie across two lines take the processor a fifth longer.
+    For what a block needs on the way only: new pages for every block take the system as long as a pass over them.
     """
     kept = getattr(_KEPT, name, None)
     if kept is None or kept.shape != shape or kept.dtype != dtype:
-        kept = _on_a_cache_line(shape, np.dtype(dtype))
+        kept = aligned_empty(shape, dtype)
         setattr(_KEPT, name, kept)
     return kept
 
 
-def _on_a_cache_line(shape: tuple[int, ...], dtype: np.dtype) -> NDArray:
+def aligned_empty(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray:
+    """As `np.empty`, beginning on a cache line: vectors of numbers that lie across two take a fifth longer."""
+    dtype = np.dtype(dtype)
     size = math.prod(shape) * dtype.itemsize
     memory = np.empty(size + _CACHE_LINE, np.uint8)
     first = -memory.ctypes.data % _CACHE_LINE

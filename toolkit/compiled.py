@@ -9,7 +9,7 @@ from typing import Any
 import numba
 from numba.core.compiler import Compiler
 
-__all__ = ["ARITHMETIC", "LOOPS", "DisjointArrays", "njit"]
+__all__ = ["ARITHMETIC", "LOOPS", "DisjointArrays", "inner", "njit"]
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +27,14 @@ class DisjointArrays(Compiler):
         return super().define_pipelines()
 
 
-LOOPS = {"cache": True, "nogil": True, "fastmath": {"contract"}, "boundscheck": False, "error_model": "numpy"}
+LOOPS = {
+    "cache": True,
+    "nogil": True,
+    "fastmath": {"contract"},
+    "boundscheck": False,
+    "error_model": "numpy",
+    "no_cfunc_wrapper": True,
+}
 """Options of loops over arrays; "contract": a product and a sum in one instruction, sums in the order written."""
 ARITHMETIC = LOOPS | {"pipeline_class": DisjointArrays}
 """For what calculates. Of what only copies some is slower so: vectorised, it gathers numbers one by one."""
@@ -50,4 +57,12 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
             compiled = numba.njit(**{**options, "cache": False})(function)
         return compiled
 
+    return decorate
+
+
+def inner(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """As `numba.njit`, for what compiled code alone calls: it is kept within that, and Python cannot call it."""
+    decorate: Callable[[Callable[..., Any]], Callable[..., Any]] = numba.njit(
+        **{**options, "cache": False, "no_cpython_wrapper": True}
+    )
     return decorate

@@ -7,10 +7,13 @@ are ``(V, 3, K)``, the shapes innermost, so that the compiler vectorises over th
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from toolkit.compiled import ARITHMETIC, LOOPS, njit
+from toolkit.compiled import ARITHMETIC, LOOPS, inner, njit
 
-__all__ = ["add_pulls", "add_side_products", "invert_edge_frames", "put_shapes_innermost"]
+__all__ = ["add_pulls", "add_side_products", "invert_edge_frames", "put_shapes_innermost", "triangle_edges"]
+
+Array = NDArray[np.float64]
 
 
 @njit(**LOOPS)
@@ -32,50 +35,63 @@ def invert_edge_frames(vertices, triangles, inverse, squared):
     Its first two rows are also the gradients, on the triangle, of what is 1 at the second or the third corner.
     """
     for f in range(len(triangles)):
-        e, g, x, y, z = _edges(vertices, triangles, f)
+        e, g, x, y, z = triangle_edges(vertices, triangles, f)
         square = x * x + y * y + z * z
-        for row, (u, v, w) in enumerate(
-            (
-                (g[1] * z - g[2] * y, g[2] * x - g[0] * z, g[0] * y - g[1] * x),
-                (y * e[2] - z * e[1], z * e[0] - x * e[2], x * e[1] - y * e[0]),
-            )
-        ):
-            inverse[f, row, 0], inverse[f, row, 1], inverse[f, row, 2] = u / square, v / square, w / square
-        root = np.sqrt(square * np.sqrt(square))
-        inverse[f, 2, 0], inverse[f, 2, 1], inverse[f, 2, 2] = x / root, y / root, z / root
+        _put_row(inverse[f, 0], g[1] * z - g[2] * y, g[2] * x - g[0] * z, g[0] * y - g[1] * x, square)
+        _put_row(inverse[f, 1], y * e[2] - z * e[1], z * e[0] - x * e[2], x * e[1] - y * e[0], square)
+        _put_row(inverse[f, 2], x, y, z, np.sqrt(square * np.sqrt(square)))
         squared[f] = square
 
 
-@njit(forceinline=True, **LOOPS)
-def _edges(vertices, triangles, f):
-    """``e0``, ``e1`` and the three numbers of ``e0 x e1``."""
+@inner(forceinline=True, **LOOPS)
+def _put_row(row, x, y, z, scale):
+    row[0], row[1], row[2] = x / scale, y / scale, z / scale
+
+
+@inner(forceinline=True, **LOOPS)
+def triangle_edges(vertices, triangles, f):
+    """``e0``, ``e1`` and the three numbers of ``e0 x e1``; for compiled code."""
     a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
     e = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
     g = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
     return e, g, e[1] * g[2] - e[2] * g[1], e[2] * g[0] - e[0] * g[2], e[0] * g[1] - e[1] * g[0]
 
 
-@njit(**LOOPS)
-def add_pulls(rest, inverse, moves, triangles, gradients, robust, weights, out):
+def add_pulls(
+    rest: Array,
+    inverse: Array,
+    moves: Array,
+    triangles: NDArray[np.integer],
+    gradients: Array,
+    robust: bool,
+    weights: Array,
+    out: Array,
+) -> None:
     """``out[i] += w_f (J_f - I) g_i`` for every corner i of every triangle, ``out`` (V, 3, K).
 
     ``J`` is the deformation gradient. ``weights`` (F,) are set: 1, or where ``robust`` ``1 / (1 + q_f^2)``, ``q_f`` the
     largest ``|J_f - I|`` of the shapes, Frobenius norm. ``gradients`` (F, 3, 3): its first two rows are ``g`` of the
     second and the third corner; all three sum to zero.
     """
-    n_vertices, _, n_shapes = moves.shape
-    frame, squared, share = np.empty((3, 3, n_shapes)), np.empty(n_shapes), np.empty((2, 3))
+    n_shapes = moves.shape[2]
+    frame, share = np.empty((3, 3, n_shapes)), np.empty((2, 3))
     # Where x, y and z are treated alike, one loop over all of them takes less than three short ones.
-    rows = 3 * n_shapes
-    columns, moved, pulled = frame.reshape(3, rows), moves.reshape(n_vertices, rows), out.reshape(n_vertices, rows)
+    columns, moved, pulled = (x.reshape(len(x), 3 * n_shapes) for x in (frame, moves, out))
+    scratch = frame, columns, np.empty(n_shapes), share
+    _add_pulls(rest, inverse, moved, triangles, gradients, robust, weights, scratch, pulled)
+
+
+@njit(**LOOPS)
+def _add_pulls(rest, inverse, moved, triangles, gradients, robust, weights, scratch, pulled):
+    frame, columns, squared, share = scratch
     for f in range(len(triangles)):
         a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
         _edge_changes(moved[a], moved[b], moved[c], columns[0], columns[1])
-        _normal_changes(*_edges(rest, triangles, f), frame[0], frame[1], frame[2])
+        _normal_changes(*triangle_edges(rest, triangles, f), frame[0], frame[1], frame[2])
         largest = 0.0
         if robust:
             _squared_changes(frame, inverse[f], squared)
-            for k in range(n_shapes):
+            for k in range(len(squared)):
                 largest = max(largest, squared[k])
         weights[f] = 1 / (1 + largest)
         for corner in range(2):
@@ -100,23 +116,29 @@ def add_side_products(gradients, weights, triangles, starts, ends, out):
         gh = w * (g[0] * h[0] + g[1] * h[1] + g[2] * h[2])
         hh = w * (h[0] * h[0] + h[1] * h[1] + h[2] * h[2])
         a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
-        for i, j, product in ((a, b, -gg - gh), (b, c, gh), (c, a, -gh - hh)):
-            e = starts[min(i, j)]
-            while ends[e] != max(i, j):
-                e += 1
-            out[e] += product
+        _add_to_side(a, b, -gg - gh, starts, ends, out)
+        _add_to_side(b, c, gh, starts, ends, out)
+        _add_to_side(c, a, -gh - hh, starts, ends, out)
 
 
-@njit(**ARITHMETIC)
+@inner(forceinline=True, **LOOPS)
+def _add_to_side(i, j, product, starts, ends, out):
+    e = starts[min(i, j)]
+    while ends[e] != max(i, j):
+        e += 1
+    out[e] += product
+
+
+@inner(**ARITHMETIC)
 def _edge_changes(at_a, at_b, at_c, first, second):
     """How ``e0`` and ``e1`` change, from the moves of a triangle's corners."""
     for i in range(len(first)):
         first[i], second[i] = at_b[i] - at_a[i], at_c[i] - at_a[i]
 
 
-@njit(**ARITHMETIC)
+@inner(**ARITHMETIC)
 def _normal_changes(e, g, x, y, z, first, second, out):
-    """How ``n`` changes in every shape, ``out`` (3, K), for what `_edges` gives and how the edges change."""
+    """How ``n`` changes in every shape, ``out`` (3, K), for what `triangle_edges` gives and how the edges change."""
     scale = 1 / np.sqrt(np.sqrt(max(x * x + y * y + z * z, 1e-300)))
     nx, ny, nz = x * scale, y * scale, z * scale
     for k in range(out.shape[1]):
@@ -127,7 +149,7 @@ def _normal_changes(e, g, x, y, z, first, second, out):
         out[0, k], out[1, k], out[2, k] = x * scale - nx, y * scale - ny, z * scale - nz
 
 
-@njit(**ARITHMETIC)
+@inner(**ARITHMETIC)
 def _squared_changes(frame, inverse, out):
     """``|J - I|^2`` of every shape, ``out`` (K,); ``frame`` (3, 3, K) is how ``E`` changes, its columns first."""
     for k in range(len(out)):
@@ -139,7 +161,7 @@ def _squared_changes(frame, inverse, out):
         out[k] = total
 
 
-@njit(**ARITHMETIC)
+@inner(**ARITHMETIC)
 def _pull(columns, share, at_a, at_b, at_c):
     """Add what a triangle's frame, its columns (3, 3 K), does to its corners."""
     for i in range(columns.shape[1]):

@@ -8,8 +8,10 @@ No two arrays that are given to one function may share memory.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from toolkit.compiled import ARITHMETIC, LOOPS, njit
+from toolkit.blocks import scratch
+from toolkit.compiled import ARITHMETIC, LOOPS, inner, njit
 
 __all__ = [
     "add_shape",
@@ -24,7 +26,7 @@ __all__ = [
 _TILE = 64
 
 
-@njit(**LOOPS)
+@inner(**LOOPS)
 def _frames_to_tile(frames, first, last, tile):
     """``tile[v - first, :, b] = frames[b, v]`` for vertices ``first <= v < last``."""
     for b in range(frames.shape[0]):
@@ -33,7 +35,7 @@ def _frames_to_tile(frames, first, last, tile):
                 tile[v - first, k, b] = frames[b, v, k]
 
 
-@njit(**ARITHMETIC)
+@inner(**ARITHMETIC)
 def _still_tile(tile, position, turns, shifts, rest, first, last, out):
     for v in range(first, last):
         x, p = tile[v - first], position[v]
@@ -44,15 +46,26 @@ def _still_tile(tile, position, turns, shifts, rest, first, last, out):
                 out[p, k, b] = moved - (shifts[k, b] + place)
 
 
-@njit(**LOOPS)
-def frames_to_block(frames, position, turns, shifts, rest, out):
+def frames_to_block(
+    frames: NDArray[np.floating],
+    position: NDArray[np.int64],
+    turns: NDArray[np.floating],
+    shifts: NDArray[np.floating],
+    rest: NDArray[np.floating],
+    out: NDArray[np.floating],
+) -> None:
     """Move, renumber and subtract the rest: ``out[position[v], :, b] = turns_b frames[b, v] - shifts_b - rest[v]``.
 
     ``frames`` (B, V, 3), ``turns`` (3, 3, B), ``shifts`` (3, B), ``rest`` (V, 3), ``out`` (V, 3, B). In float64 up to
     the difference.
     """
+    tile = scratch("tile", (_TILE, 3, len(frames)), frames.dtype)
+    _frames_to_block(frames, position, turns, shifts, rest, tile, out)
+
+
+@njit(**LOOPS)
+def _frames_to_block(frames, position, turns, shifts, rest, tile, out):
     n_vertices = frames.shape[1]
-    tile = np.empty((_TILE, 3, frames.shape[0]), frames.dtype)
     for first in range(0, n_vertices, _TILE):
         last = min(n_vertices, first + _TILE)
         _frames_to_tile(frames, first, last, tile)
@@ -104,7 +117,7 @@ def place_block(points, shift, turns, starts, out):
         _place_frames(points, shift, turns, starts, out, points.shape[2])
 
 
-@njit(forceinline=True, **ARITHMETIC)
+@inner(forceinline=True, **ARITHMETIC)
 def _place_frames(points, shift, turns, starts, out, n_frames):
     for v in range(len(points)):
         for b in range(n_frames):
@@ -117,7 +130,7 @@ def _place_frames(points, shift, turns, starts, out, n_frames):
                 out[v, k, b] = turns[k, 0, b] * x + turns[k, 1, b] * y + turns[k, 2, b] * z + starts[k, b]
 
 
-@njit(**ARITHMETIC)
+@inner(**ARITHMETIC)
 def _first_rows(coefficient, first, last, block, current, previous):
     """Rows ``first <= i < last`` of the recurrence's beginning: ``current <- coefficient block``, ``previous <- 0``."""
     for i in range(first, last):
@@ -126,7 +139,7 @@ def _first_rows(coefficient, first, last, block, current, previous):
             previous[i, c] = 0
 
 
-@njit(**ARITHMETIC)
+@inner(**ARITHMETIC)
 def _average_rows(starts, neighbours, share, own, coefficient, first, last, block, current, previous):
     """Rows ``first <= i < last`` of ``previous <- coefficient block + own current - share A current - previous``.
 
@@ -157,17 +170,17 @@ def _average_rows(starts, neighbours, share, own, coefficient, first, last, bloc
 
 
 @njit(**ARITHMETIC)
-def chebyshev_of_average(starts, neighbours, share, own, coefficients, bounds, depth, block, out, spare):
+def chebyshev_of_average(starts, neighbours, shares, own, coefficients, bounds, depth, block, out, spare):
     """``out <- sum_k c_k T_k(S) block`` (V, C) by Clenshaw's recurrence, ``S x = own x - share (sum over neighbours)``.
 
-    ``neighbours[starts[i]:starts[i + 1]]`` are row i's, ``share`` (V,). ``b_k = c_k block + 2 S b_(k+1) - b_(k+2)``;
-    ``out`` and ``spare`` do for all of them, as a row of ``b_(k+2)`` is last needed where ``b_k`` takes its place.
+    ``neighbours[starts[i]:starts[i + 1]]`` are row i's; ``shares`` (2, V) are ``share`` and twice that.
+    ``b_k = c_k block + 2 S b_(k+1) - b_(k+2)``; ``out`` and ``spare`` do for all of them, as a row of ``b_(k+2)`` is
+    last needed where ``b_k`` takes its place.
     ``bounds`` cut the rows into chunks that have neighbours in the chunks beside them only. ``depth`` steps go over the
     rows together, each a chunk behind the step before it, so that a chunk is in the cache for all of them: memory is
     the bottleneck.
     """
     degree, n_chunks = len(coefficients) - 1, len(bounds) - 1
-    double = share + share
     done = 0
     while done <= degree:
         steps = min(depth, degree + 1 - done)
@@ -177,9 +190,9 @@ def chebyshev_of_average(starts, neighbours, share, own, coefficients, bounds, d
                 k = degree - done - step
                 # Not swapped but chosen, since the steps of a front alternate; the last one writes to ``out``.
                 read, write = (spare, out) if k % 2 == 0 else (out, spare)
-                weight, at = (share, own) if k == 0 else (double, own + own)
+                share, at = (shares[0], own) if k == 0 else (shares[1], own + own)
                 if k == degree:
                     _first_rows(coefficients[k], first, last, block, write, read)
                 else:
-                    _average_rows(starts, neighbours, weight, at, coefficients[k], first, last, block, read, write)
+                    _average_rows(starts, neighbours, share, at, coefficients[k], first, last, block, read, write)
         done += steps

@@ -122,7 +122,7 @@ class SmoothingFilter:
         self._largest = largest_eigenvalue(triangles)
         half = self._largest / 2
         # S = (I - W) / half - I; W is a mean: the entries of a row are all alike.
-        self._own, self._share = 1 / half - 1, 1 / (half * count)
+        self._own, self._shares = 1 / half - 1, np.array([[1.0], [2.0]]) / (half * count)
         self._bounds = level_bounds(renumbered)
         self.coefficients = filter_coefficients(parameters.steps, parameters.lambda_, parameters.mu, self._largest)
         tail = np.cumsum(np.abs(self.coefficients[::-1]))[::-1]
@@ -165,7 +165,7 @@ class SmoothingFilter:
         chebyshev_of_average(
             self._starts,
             self._neighbours,
-            self._share.astype(block.dtype),
+            self._shares.astype(block.dtype),
             block.dtype.type(self._own),
             coefficients.astype(block.dtype),
             self._bounds,

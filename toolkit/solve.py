@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from toolkit.blocks import map_blocks
-from toolkit.substitution import part_of, substitute_backward, substitute_forward, with_ancestors, without_zeros
+from toolkit.substitution import Lower, part_of, substitute_backward, substitute_forward, with_ancestors, without_zeros
 
 __all__ = ["Factor", "PulledSolve", "SingularMatrixError", "factorise"]
 
@@ -39,7 +39,7 @@ class Factor:
     """
 
     order: NDArray[np.uint32]
-    lower: tuple[NDArray[np.int64], NDArray[np.uint32], Array]
+    lower: Lower
 
     @property
     def n(self) -> int:

@@ -7,20 +7,31 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from toolkit.blocks import aligned_empty
 from toolkit.compiled import ARITHMETIC, LOOPS, njit
 
-__all__ = ["part_of", "substitute_backward", "substitute_forward", "with_ancestors", "without_zeros"]
+__all__ = ["Lower", "part_of", "substitute_backward", "substitute_forward", "with_ancestors", "without_zeros"]
 
 # Columns are kept in whole vectors of the processor.
 _VECTOR = 4
 
+Array = NDArray[np.float64]
+Ids = NDArray[np.integer]
+Lower = tuple[NDArray[np.int64], NDArray[np.uint32], Array]
+
+
+def without_zeros(starts: NDArray[np.int64], rows: Ids, values: Array) -> Lower:
+    """The same ``L`` without the zeros that supernodes are filled up with; rows unsigned, which index faster."""
+    count = np.count_nonzero(values != 0)  # of numbers themselves, it asks one by one
+    kept = np.zeros_like(starts), np.empty(count, np.uint32), np.empty(count)
+    _copy_nonzero(starts, rows, values, *kept)
+    return kept
+
 
 @njit(**LOOPS)
-def without_zeros(starts, rows, values):
-    """The same ``L`` without the zeros that supernodes are filled up with; rows unsigned, which index faster."""
-    count = np.count_nonzero(values)
-    kept_starts, kept_rows, kept_values = np.zeros_like(starts), np.empty(count, np.uint32), np.empty(count)
+def _copy_nonzero(starts, rows, values, kept_starts, kept_rows, kept_values):
     k = 0
     for j in range(len(starts) - 1):
         for p in range(starts[j], starts[j + 1]):
@@ -28,7 +39,6 @@ def without_zeros(starts, rows, values):
                 kept_rows[k], kept_values[k] = rows[p], values[p]
                 k += 1
         kept_starts[j + 1] = k
-    return kept_starts, kept_rows, kept_values
 
 
 @njit(**LOOPS)
@@ -41,33 +51,42 @@ def with_ancestors(lower, wanted):
             wanted[rows[starts[j] + 1]] = True
 
 
-@njit(**LOOPS)
-def part_of(lower, chosen):
+def part_of(lower: Lower, chosen: Ids) -> Lower:
     """The columns ``chosen`` (m,) of ``L``, ascending and with all their ancestors, in a numbering of their own."""
-    starts, rows, values = lower
+    starts = lower[0]
     number = np.empty(len(starts) - 1, np.uint32)
+    number[chosen] = np.arange(len(chosen))
     part_starts = np.zeros(len(chosen) + 1, starts.dtype)
-    for k, j in enumerate(chosen):
-        number[j] = k
-        part_starts[k + 1] = part_starts[k] + starts[j + 1] - starts[j]
+    np.cumsum(starts[chosen + 1] - starts[chosen], out=part_starts[1:])
     part_rows, part_values = np.empty(part_starts[-1], np.uint32), np.empty(part_starts[-1])
-    for k, j in enumerate(chosen):
-        at = part_starts[k]
-        for p in range(starts[j], starts[j + 1]):
-            part_rows[at], part_values[at] = number[rows[p]], values[p]
-            at += 1
+    _copy_columns(lower, chosen, number, part_rows, part_values)
     return part_starts, part_rows, part_values
 
 
-@njit(**ARITHMETIC)
-def substitute_forward(lower, order, first, last, right):
+@njit(**LOOPS)
+def _copy_columns(lower, chosen, number, part_rows, part_values):
+    starts, rows, values = lower
+    at = 0
+    for j in chosen:
+        for p in range(starts[j], starts[j + 1]):
+            part_rows[at], part_values[at] = number[rows[p]], values[p]
+            at += 1
+
+
+def substitute_forward(lower: Lower, order: Ids, first: int, last: int, right: Array) -> Array:
     """``L^-1 right[order]`` of columns ``first <= c < last`` of ``right`` (n, m), zeros added up to whole vectors.
 
     Every number of ``L`` is read once for all columns, whose numbers in one row are next to each other.
     """
+    x = aligned_empty((len(order), -(-(last - first) // _VECTOR) * _VECTOR), np.float64)
+    _substitute_forward(lower, order, first, last - first, right, x)
+    return x
+
+
+@njit(**ARITHMETIC)
+def _substitute_forward(lower, order, first, wanted, right, x):
     starts, rows, values = lower
-    wanted, width = last - first, -(-(last - first) // _VECTOR) * _VECTOR
-    x = np.empty((len(order), width))
+    width = x.shape[1]
     for j in range(len(order)):
         for c in range(wanted):
             x[j, c] = right[order[j], first + c]
@@ -81,7 +100,6 @@ def substitute_forward(lower, order, first, last, right):
             i, factor = rows[p], values[p]
             for c in range(width):
                 x[i, c] -= factor * x[j, c]
-    return x
 
 
 @njit(**ARITHMETIC)
