@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -34,10 +35,13 @@ def work(shot: Shot, folder: StageFolder, progress: Progress) -> None:
     target = target_decomposer(shot)
     frames = np.array(shot.array("bases", "frames"))
     moves = shot.array("decompose", "smooth_deltas")[frames]
+    source = np.array(shot.array("decompose", "rest_smooth"))
     progress("factorising", 0, 1)
-    system = _system(shot, target, moves)
+    with ThreadPoolExecutor(1) as pool:  # neither needs the other, and both leave a processor idle
+        gained = pool.submit(detail_gain, shot.config.details, source, target)
+        system = _system(shot, source, target, moves)
+    gain = gained.result()
     progress("factorising", 1, 1)
-    gain = detail_gain(shot.config.details, system.source, target)
     details = shot.array("decompose", "details")[np.ix_(frames, system.pairs.vertices)]
     gaps = np.array(shot.array("bases", "pair_gaps"))[1:][frames]
     contact_map = ContactMap(load_pairs(shot), load_mesh(shot, "source").vertices, target.mesh.vertices)
@@ -85,9 +89,9 @@ def _decomposed(mesh: TriangleMesh, parameters: SmoothingParameters, neighbour: 
     return Decomposer(mesh, parameters, neighbour)
 
 
-def _system(shot: Shot, target: Decomposer, moves: np.ndarray) -> DeformationTransfer:
+def _system(shot: Shot, source: np.ndarray, target: Decomposer, moves: np.ndarray) -> DeformationTransfer:
     return DeformationTransfer(
-        np.array(shot.array("decompose", "rest_smooth")),
+        source,
         target.rest.smooth,
         target.mesh.triangles,
         moves,
