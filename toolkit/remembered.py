@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
+from xxhash import xxh3_128
 
 __all__ = ["remembered"]
 
@@ -27,7 +27,7 @@ def remembered(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        digest = hashlib.blake2b(digest_size=16)
+        digest = xxh3_128()
         _add((args, sorted(kwargs.items())), digest)
         key = digest.digest()
         result = known.pop(key, None)
@@ -41,7 +41,7 @@ def remembered(function: Callable[P, R]) -> Callable[P, R]:
     return call
 
 
-def _add(value: Any, digest: hashlib.blake2b) -> None:
+def _add(value: Any, digest: xxh3_128) -> None:
     """Take a value into the digest, with its kind and size, so that no two run together."""
     digest.update(type(value).__name__.encode())
     if isinstance(value, np.ndarray):
