@@ -131,6 +131,8 @@ def test_an_error_on_a_worker_is_raised_here_as_it_was(tmp_path: Path, scheduler
 
 
 def test_a_folder_that_workers_do_not_see_is_bad_input(tmp_path: Path, scheduler: str) -> None:
+    with distributed.Client(scheduler) as client:
+        client.wait_for_workers(2, timeout=60)  # one that died in a test before may still be on its way back
     with Cluster(scheduler) as cluster, pytest.raises(InputError, match="2 of 2 Dask workers do not see"):
         cluster.check_sees(tmp_path / "elsewhere")
 

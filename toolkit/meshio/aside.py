@@ -49,8 +49,8 @@ def folder_aside(path: str | Path) -> Iterator[Path]:
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = temporary_name(path)
-    temporary.mkdir()
     try:
+        temporary.mkdir()
         with _flushed(temporary):
             yield temporary
         _replace_folder(temporary, path)
