@@ -92,7 +92,9 @@ def run(parser: argparse.ArgumentParser, main: Main, arguments: list[str] | None
     bars = Bars()
     if threading.current_thread() is threading.main_thread():
         # Ended from outside, temporary folders are removed as after Ctrl-C.
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, _stop)
+        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as nohup and the like want it
+            signal.signal(signal.SIGINT, _stop)
     try:
         result = main(options, bars)
         bars.close()
@@ -114,6 +116,28 @@ def run(parser: argparse.ArgumentParser, main: Main, arguments: list[str] | None
     return 1 if result.get("failed") else 0
 
 
+def _stop(number: int, _frame: Any) -> None:
+    """End by KeyboardInterrupt, but while this thread compiles, soon after.
+
+    Raised where LLVM calls Python back it would be lost, or end the process on the spot.
+    """
+    lock = getattr(sys.modules.get("numba.core.compiler_lock"), "global_compiler_lock", None)
+    if lock is None or not lock.is_locked():
+        raise KeyboardInterrupt
+    again = threading.Timer(_SOON, _signal_again, (number,))
+    again.daemon = True
+    again.start()
+
+
+def _signal_again(number: int) -> None:
+    """Signal the main thread: a call that it waits in ends by a signal of its own only."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:
+        signal.raise_signal(number)
+
+
+_SOON = 0.05
 _BAD_PLACES = (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError, FileExistsError)
 """Of the system's errors those that another path or its permissions mend; a full disk is none of them."""
 
