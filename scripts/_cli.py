@@ -138,6 +138,7 @@ def _signal_again(number: int) -> None:
 
 
 _SOON = 0.05
+"""Seconds until a stop that came while code was compiled comes again."""
 _BAD_PLACES = (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError, FileExistsError)
 """Of the system's errors those that another path or its permissions mend; a full disk is none of them."""
 

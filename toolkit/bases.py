@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.blocks import map_blocks, scratch
-from toolkit.compiled import ARITHMETIC, inner, njit
+from toolkit.compiled import ARITHMETIC, helper, njit
 from toolkit.errors import InputError
 from toolkit.progress import Progress, silent
 from toolkit.steadying import steady_weights
@@ -248,7 +248,7 @@ def non_negative_weights(inner: Array, coupling: Array, start: Array | None = No
 
 
 # Plain loops: what numba brings for arrays and linear algebra takes seconds to compile and to load.
-@inner(nogil=True, error_model="numpy")
+@helper(nogil=True, error_model="numpy")
 def _solve_passive(inner, right, passive, root, ids, trial):  # type: ignore[no-untyped-def]  # compiled
     """Least squares on the passive set alone, zero elsewhere, to ``trial``; ``root`` and ``ids`` are scratch."""
     n = 0
@@ -275,7 +275,7 @@ def _solve_passive(inner, right, passive, root, ids, trial):  # type: ignore[no-
         trial[ids[a]] = value / root[a, a]
 
 
-@inner(nogil=True, error_model="numpy")
+@helper(nogil=True, error_model="numpy")
 def _steepest(inner, right, w, passive, tolerance):  # type: ignore[no-untyped-def]  # compiled
     """The active weight whose growth lowers the error most, or -1."""
     best, best_value = -1, tolerance

@@ -9,7 +9,7 @@ from typing import Any
 import numba
 from numba.core.compiler import Compiler
 
-__all__ = ["ARITHMETIC", "LOOPS", "DisjointArrays", "inner", "njit"]
+__all__ = ["ARITHMETIC", "LOOPS", "DisjointArrays", "helper", "njit"]
 
 log = logging.getLogger(__name__)
 
@@ -60,8 +60,11 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     return decorate
 
 
-def inner(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """As `numba.njit`, for what compiled code alone calls: it is kept within that, and Python cannot call it."""
+def helper(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """As `numba.njit`, for what compiled code alone calls: it is kept within that, and Python cannot call it.
+
+    numba renews what it keeps of a module when that module's file changes, not when that of a helper does.
+    """
     decorate: Callable[[Callable[..., Any]], Callable[..., Any]] = numba.njit(
         **{**options, "cache": False, "no_cpython_wrapper": True}
     )

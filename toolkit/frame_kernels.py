@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.blocks import scratch
-from toolkit.compiled import ARITHMETIC, LOOPS, inner, njit
+from toolkit.compiled import ARITHMETIC, LOOPS, helper, njit
 
 __all__ = ["block_frames", "longest_in_plane", "opposite_edges", "rotate_details", "take_details"]
 
@@ -66,12 +66,12 @@ def _find_longest(points, starts, edges, longest):
                     best, longest[v] = in_plane, w
 
 
-@inner(forceinline=True, **LOOPS)
+@helper(forceinline=True, **LOOPS)
 def _minus(points, i, j, t):
     return points[i, 0, t] - points[j, 0, t], points[i, 1, t] - points[j, 1, t], points[i, 2, t] - points[j, 2, t]
 
 
-@inner(forceinline=True, **LOOPS)
+@helper(forceinline=True, **LOOPS)
 def _sum_normals(points, starts, edges, v, normal):
     """Area-weighted normal (not normalised) of vertex ``v`` in every frame, to ``normal`` (3, B)."""
     if points.shape[2] == 1:  # what is displayed: numbers by themselves take half the time
@@ -80,7 +80,7 @@ def _sum_normals(points, starts, edges, v, normal):
         _sum_in_frames(points, starts, edges, v, normal)
 
 
-@inner(**ARITHMETIC)
+@helper(**ARITHMETIC)
 def _sum_in_frames(points, starts, edges, v, normal):
     normal[:] = 0
     for e in range(starts[v], starts[v + 1]):
@@ -93,7 +93,7 @@ def _sum_in_frames(points, starts, edges, v, normal):
             normal[2, t] += ux * vy - uy * vx
 
 
-@inner(forceinline=True, **LOOPS)
+@helper(forceinline=True, **LOOPS)
 def _sum_normal(points, starts, edges, v, t):
     """The same in frame ``t``: three numbers."""
     x = y = z = points.dtype.type(0)
@@ -107,14 +107,14 @@ def _sum_normal(points, starts, edges, v, t):
     return x, y, z
 
 
-@inner(forceinline=True, **LOOPS)
+@helper(forceinline=True, **LOOPS)
 def _unit(x, y, z):
     one, tiny = np.float32(1), np.float32(1e-20)
     scale = one / max(np.sqrt(x * x + y * y + z * z), tiny)
     return x * scale, y * scale, z * scale
 
 
-@inner(forceinline=True, **LOOPS)
+@helper(forceinline=True, **LOOPS)
 def _local_frame(points, nx, ny, nz, v, w, t):
     """Tangent, towards the neighbour ``w``, bitangent and normal of vertex ``v`` in frame ``t``: nine numbers."""
     nx, ny, nz = _unit(nx, ny, nz)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.compiled import ARITHMETIC, LOOPS, inner, njit
+from toolkit.compiled import ARITHMETIC, LOOPS, helper, njit
 
 __all__ = ["add_pulls", "add_side_products", "invert_edge_frames", "put_shapes_innermost", "triangle_edges"]
 
@@ -43,12 +43,12 @@ def invert_edge_frames(vertices, triangles, inverse, squared):
         squared[f] = square
 
 
-@inner(forceinline=True, **LOOPS)
+@helper(forceinline=True, **LOOPS)
 def _put_row(row, x, y, z, scale):
     row[0], row[1], row[2] = x / scale, y / scale, z / scale
 
 
-@inner(forceinline=True, **LOOPS)
+@helper(forceinline=True, **LOOPS)
 def triangle_edges(vertices, triangles, f):
     """``e0``, ``e1`` and the three numbers of ``e0 x e1``; for compiled code."""
     a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
@@ -121,7 +121,7 @@ def add_side_products(gradients, weights, triangles, starts, ends, out):
         _add_to_side(c, a, -gh - hh, starts, ends, out)
 
 
-@inner(forceinline=True, **LOOPS)
+@helper(forceinline=True, **LOOPS)
 def _add_to_side(i, j, product, starts, ends, out):
     e = starts[min(i, j)]
     while ends[e] != max(i, j):
@@ -129,14 +129,14 @@ def _add_to_side(i, j, product, starts, ends, out):
     out[e] += product
 
 
-@inner(**ARITHMETIC)
+@helper(**ARITHMETIC)
 def _edge_changes(at_a, at_b, at_c, first, second):
     """How ``e0`` and ``e1`` change, from the moves of a triangle's corners."""
     for i in range(len(first)):
         first[i], second[i] = at_b[i] - at_a[i], at_c[i] - at_a[i]
 
 
-@inner(**ARITHMETIC)
+@helper(**ARITHMETIC)
 def _normal_changes(e, g, x, y, z, first, second, out):
     """How ``n`` changes in every shape, ``out`` (3, K), for what `triangle_edges` gives and how the edges change."""
     scale = 1 / np.sqrt(np.sqrt(max(x * x + y * y + z * z, 1e-300)))
@@ -149,7 +149,7 @@ def _normal_changes(e, g, x, y, z, first, second, out):
         out[0, k], out[1, k], out[2, k] = x * scale - nx, y * scale - ny, z * scale - nz
 
 
-@inner(**ARITHMETIC)
+@helper(**ARITHMETIC)
 def _squared_changes(frame, inverse, out):
     """``|J - I|^2`` of every shape, ``out`` (K,); ``frame`` (3, 3, K) is how ``E`` changes, its columns first."""
     for k in range(len(out)):
@@ -161,7 +161,7 @@ def _squared_changes(frame, inverse, out):
         out[k] = total
 
 
-@inner(**ARITHMETIC)
+@helper(**ARITHMETIC)
 def _pull(columns, share, at_a, at_b, at_c):
     """Add what a triangle's frame, its columns (3, 3 K), does to its corners."""
     for i in range(columns.shape[1]):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.blocks import scratch
-from toolkit.compiled import ARITHMETIC, LOOPS, inner, njit
+from toolkit.compiled import ARITHMETIC, LOOPS, helper, njit
 
 __all__ = [
     "add_shape",
@@ -26,7 +26,7 @@ __all__ = [
 _TILE = 64
 
 
-@inner(**LOOPS)
+@helper(**LOOPS)
 def _frames_to_tile(frames, first, last, tile):
     """``tile[v - first, :, b] = frames[b, v]`` for vertices ``first <= v < last``."""
     for b in range(frames.shape[0]):
@@ -35,7 +35,7 @@ def _frames_to_tile(frames, first, last, tile):
                 tile[v - first, k, b] = frames[b, v, k]
 
 
-@inner(**ARITHMETIC)
+@helper(**ARITHMETIC)
 def _still_tile(tile, position, turns, shifts, rest, first, last, out):
     for v in range(first, last):
         x, p = tile[v - first], position[v]
@@ -117,7 +117,7 @@ def place_block(points, shift, turns, starts, out):
         _place_frames(points, shift, turns, starts, out, points.shape[2])
 
 
-@inner(forceinline=True, **ARITHMETIC)
+@helper(forceinline=True, **ARITHMETIC)
 def _place_frames(points, shift, turns, starts, out, n_frames):
     for v in range(len(points)):
         for b in range(n_frames):
@@ -130,7 +130,7 @@ def _place_frames(points, shift, turns, starts, out, n_frames):
                 out[v, k, b] = turns[k, 0, b] * x + turns[k, 1, b] * y + turns[k, 2, b] * z + starts[k, b]
 
 
-@inner(**ARITHMETIC)
+@helper(**ARITHMETIC)
 def _first_rows(coefficient, first, last, block, current, previous):
     """Rows ``first <= i < last`` of the recurrence's beginning: ``current <- coefficient block``, ``previous <- 0``."""
     for i in range(first, last):
@@ -139,7 +139,7 @@ def _first_rows(coefficient, first, last, block, current, previous):
             previous[i, c] = 0
 
 
-@inner(**ARITHMETIC)
+@helper(**ARITHMETIC)
 def _average_rows(starts, neighbours, share, own, coefficient, first, last, block, current, previous):
     """Rows ``first <= i < last`` of ``previous <- coefficient block + own current - share A current - previous``.
 

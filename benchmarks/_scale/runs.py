@@ -94,7 +94,7 @@ def run_measured(shot: Path, compiled: Path | None = None) -> Run:
 
     ``compiled`` is the folder for numba's compiled code, if it is not the usual one.
     """
-    said, own, peak = _child("stages", shot, {"NUMBA_CACHE_DIR": str(compiled)} if compiled else {})
+    said, own, peak = _child("stages", shot, **({"NUMBA_CACHE_DIR": str(compiled)} if compiled else {}))
     names = ("total_s", "cpu_s", "stages", "stages_cpu", "bases", "inputs_s")
     return Run(**{name: said[name] for name in names}, own_gb=own, peak_gb=peak)
 
@@ -121,12 +121,10 @@ def warm_up(folder: Path) -> None:
     run_measured(folder)
 
 
-def _child(task: str, shot: Path, environment: dict[str, str] | None = None) -> tuple[dict[str, Any], float, float]:
+def _child(task: str, shot: Path, **environment: str) -> tuple[dict[str, Any], float, float]:
     """What ``benchmarks._scale.child`` says, and the most memory that it had: its own, and all (GiB)."""
     command = [sys.executable, "-m", "benchmarks._scale.child", task, str(shot)]
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, cwd=ROOT, env=os.environ | (environment or {})
-    )
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT, env=os.environ | environment)
     peaks = [0.0]
     watch = threading.Thread(target=_watch_memory, args=(process, peaks))
     watch.start()
